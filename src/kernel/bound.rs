@@ -1,0 +1,18 @@
+//! The unit roundoff and what is built from it: every constant of every filter stands here, with its derivation.
+
+/// The unit roundoff of f64, 2⁻⁵³: a rounded operation is off by at most `U` times its result.
+pub const U: f64 = f64::EPSILON / 2.0;
+
+/// γₙ = n·u/(1 − n·u): a bound on the relative error of n roundings in a row (Higham, *Accuracy and Stability*, §3.1).
+#[must_use]
+pub const fn gamma(n: u32) -> f64 {
+    let nu = n as f64 * U;
+    nu / (1.0 - nu)
+}
+
+/// Covers the rounding of a bound's own arithmetic: at most 64 operations on positive numbers, each up by 1 + u.
+pub const INFLATE: f64 = 1.0 + 128.0 * U;
+
+/// What underflow can add to a sum of a few dozen products: each is off by at most 2⁻¹⁰⁷⁴, and so is each of their
+/// rounding errors. Far below any number the filters decide on, it keeps them honest where products vanish.
+pub const UNDERFLOW: f64 = f64::from_bits((1023 - 1000) << 52); // 2⁻¹⁰⁰⁰

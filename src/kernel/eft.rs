@@ -1,0 +1,99 @@
+//! Error-free transforms: the rounded result of one operation and, exactly, what rounding took away.
+//!
+//! Sources: Knuth (two-sum), Dekker 1971 and Veltkamp (two-product without FMA), Ogita, Rump, Oishi 2005.
+//! Exact as long as nothing over- or underflows: docs/numerics.md §1.
+
+use std::fmt::Debug;
+
+/// (s, e): s = fl(a + b) and s + e = a + b exactly.
+#[inline(always)]
+#[must_use]
+pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let s = a + b;
+    let bb = s - a;
+    (s, (a - (s - bb)) + (b - bb))
+}
+
+/// (d, e): d = fl(a − b) and d + e = a − b exactly.
+#[inline(always)]
+#[must_use]
+pub fn two_diff(a: f64, b: f64) -> (f64, f64) {
+    let d = a - b;
+    let bb = d - a;
+    (d, (a - (d - bb)) - (b + bb))
+}
+
+/// [`two_sum`] for |a| ≥ |b| or a = 0.
+#[inline(always)]
+#[must_use]
+pub fn quick_two_sum(a: f64, b: f64) -> (f64, f64) {
+    let s = a + b;
+    (s, b - (s - a))
+}
+
+/// How a product's rounding error is found. Both ways give the same bits, so a kernel generic over this trait answers
+/// alike on every CPU; plain expressions never fuse.
+pub trait Product: Copy + Debug {
+    /// (p, e): p = fl(a·b) and p + e = a·b exactly.
+    fn two_product(a: f64, b: f64) -> (f64, f64);
+}
+
+/// By fused multiply-add: two instructions, but only inside code compiled for a CPU that has it
+/// ([`dispatch`](super::cpu::dispatch)); elsewhere it is a library call.
+#[derive(Clone, Copy, Debug)]
+pub struct Fused;
+
+/// By splitting both factors into halves of 26 bits (Veltkamp, Dekker): 17 operations on any CPU.
+#[derive(Clone, Copy, Debug)]
+pub struct Split;
+
+impl Product for Fused {
+    #[inline(always)]
+    fn two_product(a: f64, b: f64) -> (f64, f64) {
+        let p = a * b;
+        (p, f64::mul_add(a, b, -p))
+    }
+}
+
+impl Product for Split {
+    #[inline(always)]
+    fn two_product(a: f64, b: f64) -> (f64, f64) {
+        let p = a * b;
+        let (a_hi, a_lo) = split(a);
+        let (b_hi, b_lo) = split(b);
+        (p, ((a_hi * b_hi - p) + a_hi * b_lo + a_lo * b_hi) + a_lo * b_lo)
+    }
+}
+
+/// a = hi + lo, each of at most 26 bits.
+#[inline(always)]
+fn split(a: f64) -> (f64, f64) {
+    const FACTOR: f64 = 134_217_729.0; // 2²⁷ + 1
+    let c = FACTOR * a;
+    let hi = c - (c - a);
+    (hi, a - hi)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::dyadic::Dyadic;
+    use super::super::number::Number;
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn fused_and_split_products_have_the_same_bits(a in -1e60..1e60f64, b in -1e60..1e60f64) {
+            prop_assert_eq!(Fused::two_product(a, b), Split::two_product(a, b));
+        }
+
+        #[test]
+        fn sum_and_difference_are_exact(a in -1e60..1e60f64, b in -1e-20..1e60f64) {
+            let exact = Dyadic::from(a).plus(&b.into());
+            let (s, e) = two_sum(a, b);
+            prop_assert!(Dyadic::from(s).plus(&e.into()).minus(&exact).is_zero());
+            let (d, e) = two_diff(a, -b);
+            prop_assert!(Dyadic::from(d).plus(&e.into()).minus(&exact).is_zero());
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! What a ray can meet.
+
+use crate::{Aabb, Hit, Interval, Ray};
+use glam::{DVec2, DVec3};
+use std::fmt::Debug;
+use std::sync::Arc;
+
+/// A surface that rays meet.
+///
+/// [`intersect`](Self::intersect) answers with a small [`Hit`]; everything else is asked of the closest hit only, with
+/// the same ray. Only the first three methods are required; the others have defaults that are right for a flat shape
+/// and say what a curved one gains by its own.
+///
+/// All vectors are in the shape's own frame, the frame of the ray that is passed in. The trait is object-safe, and
+/// `&S`, `Box<S>` and `Arc<S>` are shapes by forwarding every method.
+pub trait Shape: Debug + Send + Sync {
+    /// The nearest hit with λ inside `within`, or `None`.
+    ///
+    /// Total: any ray gives an answer, and one that is not [valid](Ray::is_valid) misses. Each shape of this crate
+    /// decides hit or miss as exact arithmetic on its stored numbers would, and `hit.error` bounds the error of λ.
+    fn intersect(&self, ray: &Ray, within: Interval) -> Option<Hit>;
+
+    /// The geometric normal at `hit`: a unit vector, outward for solids, by winding for open shapes; never turned
+    /// towards the ray.
+    fn normal(&self, ray: &Ray, hit: &Hit) -> DVec3;
+
+    /// A box that holds the whole shape; infinite for an unbounded one.
+    fn bounds(&self) -> Aabb;
+
+    /// Whether anything is hit inside `within`: the same answer as `intersect(…).is_some()`, often sooner.
+    fn occludes(&self, ray: &Ray, within: Interval) -> bool {
+        self.intersect(ray, within).is_some()
+    }
+
+    /// The normal that shading uses: a unit vector, interpolated on smooth meshes, else the geometric
+    /// [`normal`](Self::normal).
+    fn shading_normal(&self, ray: &Ray, hit: &Hit) -> DVec3 {
+        self.normal(ray, hit)
+    }
+
+    /// Texture coordinates at `hit`, nominally in [0, 1]²; by default the hit's own `uv`.
+    fn texture_coordinates(&self, ray: &Ray, hit: &Hit) -> DVec2 {
+        let _ = ray;
+        hit.uv
+    }
+
+    /// The point of `hit`, as near to the surface as can be had. The default is `ray.at(lambda)` with its bound; a
+    /// shape that projects that point back onto itself has a far smaller one.
+    fn point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let step = hit.lambda * ray.direction;
+        let size = ray.origin.abs() + step.abs();
+        // Two roundings of the components, and λ's own error.
+        let error = 4.0 * f64::EPSILON * size.max_element() + 2.0 * hit.error * ray.direction.length();
+        SurfacePoint { position: ray.origin + step, error }
+    }
+
+    /// Whether `ray`, which starts next to the surface at `hit`, is certain to have left it: its origin lies strictly
+    /// on the side that `outward` names (the side of [`normal`](Self::normal) if true), and it does not meet the same
+    /// piece of surface again on its way out. [`Surface::spawn`](crate::Surface::spawn) moves an origin until this
+    /// holds. The default trusts the bound of [`point`](Self::point).
+    fn departs(&self, ray: &Ray, hit: &Hit, outward: bool) -> bool {
+        let _ = (ray, hit, outward);
+        true
+    }
+
+    /// An upper bound of the surface's normal curvature (1/radius) near `hit`; zero for flat shapes, which is the
+    /// default. [`Affine`](crate::Affine) bounds by it how far λ moves when a ray is rounded.
+    fn curvature(&self, ray: &Ray, hit: &Hit) -> f64 {
+        let _ = (ray, hit);
+        0.0
+    }
+
+    /// λ of `hit` to about a hundred bits, as an unevaluated sum of two floats: what [`Scene`](crate::Scene) compares
+    /// when two objects' hits lie within their bounds of each other. The default knows no more than the hit.
+    fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {
+        let _ = ray;
+        [hit.lambda, 0.0]
+    }
+}
+
+/// A point on a surface, nearly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Where.
+    pub position: DVec3,
+    /// `position` is at most this far from the surface. Along the surface it is off the exact hit by at most this plus
+    /// the hit's `error` times the length of the ray's direction.
+    pub error: f64,
+}
+
+macro_rules! forward_shape {
+    ($($pointer:ty),*) => {$(
+        impl<S: Shape + ?Sized> Shape for $pointer {
+            fn intersect(&self, ray: &Ray, within: Interval) -> Option<Hit> {
+                (**self).intersect(ray, within)
+            }
+            fn normal(&self, ray: &Ray, hit: &Hit) -> DVec3 {
+                (**self).normal(ray, hit)
+            }
+            fn bounds(&self) -> Aabb {
+                (**self).bounds()
+            }
+            fn occludes(&self, ray: &Ray, within: Interval) -> bool {
+                (**self).occludes(ray, within)
+            }
+            fn shading_normal(&self, ray: &Ray, hit: &Hit) -> DVec3 {
+                (**self).shading_normal(ray, hit)
+            }
+            fn texture_coordinates(&self, ray: &Ray, hit: &Hit) -> DVec2 {
+                (**self).texture_coordinates(ray, hit)
+            }
+            fn point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+                (**self).point(ray, hit)
+            }
+            fn departs(&self, ray: &Ray, hit: &Hit, outward: bool) -> bool {
+                (**self).departs(ray, hit, outward)
+            }
+            fn curvature(&self, ray: &Ray, hit: &Hit) -> f64 {
+                (**self).curvature(ray, hit)
+            }
+            fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {
+                (**self).precise_lambda(ray, hit)
+            }
+        }
+    )*};
+}
+forward_shape!(&S, Box<S>, Arc<S>);

@@ -1,0 +1,100 @@
+//! A hit looked at closely: where it is, which way the surface faces, and how to leave it.
+
+use crate::{Hit, Ray, Shape};
+use glam::{DVec2, DVec3};
+
+/// The surface at a hit, and rays that leave it.
+///
+/// ```
+/// use truehit::{Interval, Ray, Shape, Sphere, Surface};
+/// let ball = Sphere::new([0.0; 3], 1.0)?;
+/// let ray = Ray::new([0.3, 0.4, 5.0], [0.0, 0.0, -1.0]);
+/// let hit = ball.intersect(&ray, Interval::FORWARD).unwrap();
+/// let surface = Surface::new(&ball, &ray, &hit);
+/// // Away from the ball: it is never met again, whatever the scale.
+/// let away = surface.spawn(surface.normal());
+/// assert!(ball.intersect(&away, Interval::FORWARD).is_none());
+/// # Ok::<(), truehit::InvalidShape>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Surface<'a> {
+    shape: &'a dyn Shape,
+    ray: Ray,
+    hit: Hit,
+    point: DVec3,
+    error: f64,
+    normal: DVec3,
+}
+
+impl<'a> Surface<'a> {
+    /// The surface of `shape` where `ray` met it at `hit`.
+    #[must_use]
+    pub fn new(shape: &'a dyn Shape, ray: &Ray, hit: &Hit) -> Self {
+        let point = shape.point(ray, hit);
+        Self { shape, ray: *ray, hit: *hit, point: point.position, error: point.error, normal: shape.normal(ray, hit) }
+    }
+
+    /// The point, at most [`error`](Self::error) off the surface.
+    #[must_use]
+    pub fn point(&self) -> DVec3 {
+        self.point
+    }
+
+    /// How far [`point`](Self::point) may be from the surface.
+    #[must_use]
+    pub fn error(&self) -> f64 {
+        self.error
+    }
+
+    /// The geometric unit normal, outward or by winding.
+    #[must_use]
+    pub fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
+    /// The unit normal for shading.
+    #[must_use]
+    pub fn shading_normal(&self) -> DVec3 {
+        self.shape.shading_normal(&self.ray, &self.hit)
+    }
+
+    /// Texture coordinates.
+    #[must_use]
+    pub fn texture_coordinates(&self) -> DVec2 {
+        self.shape.texture_coordinates(&self.ray, &self.hit)
+    }
+
+    /// A ray that leaves the surface along `direction` (any non-zero length): it never meets the piece of surface it
+    /// starts on, on its way out. A direction with a positive component along the normal leaves outward, any other
+    /// inward (a refracted ray: it meets a solid's far side as it should).
+    ///
+    /// The origin is [`point`](Self::point) moved off the surface by its own error bound, and further only if the
+    /// shape's exact test says that it is not yet clear: a few units in the last place, no epsilon.
+    #[must_use]
+    pub fn spawn(&self, direction: DVec3) -> Ray {
+        self.leave(direction, |_| direction)
+    }
+
+    /// A ray from the surface to `target`, which it reaches at λ = 1: a shadow ray, to be traced over
+    /// `Interval::new(0.0, 1.0)`.
+    #[must_use]
+    pub fn spawn_to(&self, target: DVec3) -> Ray {
+        self.leave(target - self.point, |origin| target - origin)
+    }
+
+    fn leave(&self, direction: DVec3, direction_from: impl Fn(DVec3) -> DVec3) -> Ray {
+        let outward = direction.dot(self.normal) >= 0.0;
+        let away = if outward { self.normal } else { -self.normal };
+        // At least a unit in the last place of the largest coordinate, or adding the step would do nothing.
+        let mut step = (2.0 * self.error).max(self.point.abs().max_element() * f64::EPSILON).max(f64::MIN_POSITIVE);
+        loop {
+            let origin = self.point + step * away;
+            let ray = Ray { origin, direction: direction_from(origin) };
+            // Doubling reaches any distance; a shape that never lets go is left at the end of the range.
+            if self.shape.departs(&ray, &self.hit, outward) || !step.is_finite() {
+                return ray;
+            }
+            step *= 2.0;
+        }
+    }
+}
