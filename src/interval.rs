@@ -29,7 +29,7 @@ impl Interval {
     #[inline]
     #[must_use]
     pub fn is_empty(self) -> bool {
-        // Written so that a NaN limit makes it empty.
-        !(self.min < self.max)
+        // A NaN limit compares as nothing, which makes it empty.
+        self.min.partial_cmp(&self.max) != Some(std::cmp::Ordering::Less)
     }
 }

@@ -67,7 +67,7 @@ impl Scaled {
         if self.is_negative() { self.negated() } else { self }
     }
 
-    /// self + other: relative error of the sum ≤ 3u²/(1−4u) if the signs agree or cancel (AccurateDWPlusDW).
+    /// self + other: relative error of the sum ≤ 3u²/(1−4u) if the signs agree or cancel (`AccurateDWPlusDW`).
     #[must_use]
     pub fn plus(self, other: Self) -> Self {
         if self.is_zero() {
