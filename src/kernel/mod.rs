@@ -7,3 +7,4 @@ pub mod dyadic;
 pub mod eft;
 pub mod number;
 pub mod scaled;
+pub mod textbook;
