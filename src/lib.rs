@@ -1,18 +1,26 @@
 //! truehit
 mod aabb;
+mod camera;
 mod error;
 mod hit;
 mod interval;
 pub mod kernel;
+mod raster;
 mod ray;
+mod scene;
+pub mod shading;
 mod shape;
+pub mod signature;
 mod surface;
 
 pub use aabb::Aabb;
+pub use camera::{Camera, InvalidCamera};
 pub use error::InvalidShape;
 pub use glam;
 pub use hit::Hit;
 pub use interval::Interval;
+pub use raster::Raster;
 pub use ray::Ray;
+pub use scene::{Scene, SceneBuilder, SceneHit};
 pub use shape::{Shape, SurfacePoint};
 pub use surface::Surface;
