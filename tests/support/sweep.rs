@@ -1,0 +1,195 @@
+//! Many cases of a family through one kernel, counted.
+
+use super::cases::{Case, Family, Kernel, Solid};
+use super::measure::{measure, scale};
+use super::oracle::truth;
+use truehit::Hit;
+use truehit::glam::{DVec2, DVec3};
+use truehit::kernel::textbook;
+
+/// What a kernel answers to a case; `None` for shapes it does not know.
+pub type Answer = fn(&Case) -> Option<Hit>;
+
+/// What came out.
+#[derive(Clone, Debug, Default)]
+pub struct Row {
+    pub cases: usize,
+    /// By the exact truth.
+    pub hits: usize,
+    pub false_hits: usize,
+    pub false_misses: usize,
+    /// Hits that name a part the point does not belong to.
+    pub wrong_parts: usize,
+    /// Bounds that do not hold.
+    pub violations: usize,
+    /// Of each right hit.
+    pub ulps: Vec<f32>,
+    /// bound / error of each right hit whose λ is not exact.
+    pub tightness: Vec<f32>,
+    /// The largest error in ulps, and the case.
+    pub worst: Option<(f64, Case)>,
+    /// The first cases of a wrong decision, a wrong part, a violated bound.
+    pub failures: Vec<(&'static str, Case)>,
+}
+
+impl Row {
+    pub fn wrong(&self) -> usize {
+        self.false_hits + self.false_misses
+    }
+
+    pub fn add(&mut self, case: &Case, answer: Option<Hit>) {
+        let truth = truth(case);
+        self.cases += 1;
+        self.hits += usize::from(truth.is_some());
+        let failed = |row: &mut Self, what| {
+            if row.failures.len() < 10 {
+                row.failures.push((what, case.clone()));
+            }
+        };
+        match (truth, answer) {
+            (None, None) => {}
+            (None, Some(_)) => {
+                self.false_hits += 1;
+                failed(self, "false hit");
+            }
+            (Some(_), None) => {
+                self.false_misses += 1;
+                failed(self, "false miss");
+            }
+            (Some(truth), Some(hit)) => {
+                if !truth.parts.contains(&hit.part) {
+                    self.wrong_parts += 1;
+                    failed(self, "wrong part");
+                }
+                let m = measure(&hit, &truth.lambda.enclosure(), scale(case));
+                if m.violated {
+                    self.violations += 1;
+                    failed(self, "bound violated");
+                }
+                self.ulps.push(m.ulps as f32);
+                if m.tightness.is_finite() {
+                    self.tightness.push(m.tightness as f32);
+                }
+                if self.worst.as_ref().is_none_or(|w| m.ulps > w.0) {
+                    self.worst = Some((m.ulps, case.clone()));
+                }
+            }
+        }
+    }
+
+    pub fn merge(&mut self, other: Self) {
+        self.cases += other.cases;
+        self.hits += other.hits;
+        self.false_hits += other.false_hits;
+        self.false_misses += other.false_misses;
+        self.wrong_parts += other.wrong_parts;
+        self.violations += other.violations;
+        self.ulps.extend(other.ulps);
+        self.tightness.extend(other.tightness);
+        self.failures.extend(other.failures);
+        self.failures.truncate(10);
+        if let Some(w) = other.worst
+            && self.worst.as_ref().is_none_or(|s| w.0 > s.0)
+        {
+            self.worst = Some(w);
+        }
+    }
+
+    pub fn max_ulps(&self) -> f64 {
+        self.worst.as_ref().map_or(0.0, |w| w.0)
+    }
+}
+
+/// The `q` quantile of what is in `values`; 0 of nothing.
+pub fn quantile(values: &[f32], q: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f32::total_cmp);
+    f64::from(sorted[((sorted.len() - 1) as f64 * q).round() as usize])
+}
+
+pub fn sweep(family: &Family, answer: Answer, cases: std::ops::Range<usize>) -> Row {
+    let mut row = Row::default();
+    for i in cases {
+        let case = family.case(i);
+        row.add(&case, answer(&case));
+    }
+    row
+}
+
+/// A kernel to be lined up with others: its name, the shapes it answers, the answer.
+#[derive(Clone, Copy)]
+pub struct Contender {
+    pub name: &'static str,
+    pub kernels: &'static [Kernel],
+    pub answer: Answer,
+}
+
+macro_rules! textbook {
+    ($r:ty, $suffix:literal) => {
+        [
+            textbook!($suffix, "plane", [Plane], |c| match &c.solid {
+                Solid::Plane { point, normal } => textbook::plane::<$r>(&c.ray, *point, *normal, c.within),
+                _ => None,
+            }),
+            textbook!($suffix, "algorithm 1", [Triangle], |c| match &c.solid {
+                Solid::Triangle(v) => textbook::algorithm_1::<$r>(&c.ray, v, c.within),
+                _ => None,
+            }),
+            textbook!($suffix, "algorithm 2", [Triangle], |c| match &c.solid {
+                Solid::Triangle(v) => textbook::algorithm_2::<$r>(&c.ray, v, c.within),
+                _ => None,
+            }),
+            textbook!($suffix, "Möller–Trumbore", [Triangle], |c| match &c.solid {
+                Solid::Triangle(v) => textbook::moller_trumbore::<$r>(&c.ray, v, c.within),
+                _ => None,
+            }),
+            textbook!($suffix, "Woop", [Triangle], |c| match &c.solid {
+                Solid::Triangle(v) => textbook::woop::<$r>(&c.ray, v, c.within),
+                _ => None,
+            }),
+            textbook!($suffix, "polygon", [Polygon], |c| match &c.solid {
+                Solid::Polygon(contours) => {
+                    let contours: Vec<&[DVec3]> = contours.iter().map(Vec::as_slice).collect();
+                    textbook::polygon::<$r>(&c.ray, &contours, c.within)
+                }
+                _ => None,
+            }),
+            textbook!($suffix, "slide formula", [Sphere], |c| match &c.solid {
+                Solid::Sphere { center, radius } => textbook::sphere::<$r>(&c.ray, *center, *radius, c.within),
+                _ => None,
+            }),
+            textbook!($suffix, "Gems ch. 7", [Sphere], |c| match &c.solid {
+                Solid::Sphere { center, radius } => textbook::sphere_gems::<$r>(&c.ray, *center, *radius, c.within),
+                _ => None,
+            }),
+            textbook!($suffix, "cylinder", [Cylinder], |c| match &c.solid {
+                Solid::Frustum { base, top, base_radius, top_radius } => {
+                    textbook::cylinder::<$r>(&c.ray, *base, *top, *base_radius, *top_radius, c.within)
+                }
+                _ => None,
+            }),
+            textbook!($suffix, "cone", [Cone], |c| match &c.solid {
+                Solid::Frustum { base, top, base_radius, top_radius } => {
+                    textbook::cone::<$r>(&c.ray, *base, *top, *base_radius, *top_radius, c.within)
+                }
+                _ => None,
+            }),
+            textbook!($suffix, "slab", [Slab], |c| match &c.solid {
+                Solid::Slab { min, max } => {
+                    let enter = textbook::slab::<$r>(&c.ray, *min, *max, c.within)?.0;
+                    Some(Hit { lambda: enter, error: f64::INFINITY, uv: DVec2::ZERO, part: 0 })
+                }
+                _ => None,
+            }),
+        ]
+    };
+    ($suffix:literal, $name:literal, [$kernel:ident], $answer:expr) => {
+        Contender { name: concat!($name, " ", $suffix), kernels: &[Kernel::$kernel], answer: $answer }
+    };
+}
+
+/// The textbook kernels, f64 first.
+pub const TEXTBOOK: [[Contender; 11]; 2] = [textbook!(f64, "f64"), textbook!(f32, "f32")];
