@@ -16,3 +16,7 @@ pub const INFLATE: f64 = 1.0 + 128.0 * U;
 /// What underflow can add to a sum of a few dozen products: each is off by at most 2⁻¹⁰⁷⁴, and so is each of their
 /// rounding errors. Far below any number the filters decide on, it keeps them honest where products vanish.
 pub const UNDERFLOW: f64 = f64::from_bits((1023 - 1000) << 52); // 2⁻¹⁰⁰⁰
+
+/// Triangle, docs/numerics.md §4: each edge function is off by at most 49u·|d|∞·(|e₁||e₂| + |s|(|e₁|+|e₂|)), in largest
+/// components; the last one covers the bound's own arithmetic.
+pub const TRIANGLE_SIDES: f64 = 50.0 * U;

@@ -143,10 +143,8 @@ impl Scaled {
     #[must_use]
     pub fn to_f64(self) -> (f64, f64) {
         let (hi, lo) = (ldexp(self.hi, self.exponent), ldexp(self.lo.abs(), self.exponent));
-        if hi.abs() < f64::MIN_POSITIVE * 4.0 {
-            // Rounded to a multiple of the smallest subnormal, and so may `lo` have been.
-            return (hi, lo + 2.0 * f64::from_bits(1));
-        }
+        // Either may have been rounded to a multiple of the smallest subnormal; to a normal `lo` this adds nothing.
+        let lo = lo + 2.0 * f64::from_bits(1);
         (hi, if hi.is_finite() { lo } else { f64::INFINITY })
     }
 
