@@ -69,8 +69,9 @@ pub fn intersect_with<P: Product>(ray: &Ray, vertices: &[DVec3; 3], within: Inte
     let kappa = condition * md;
     // Far outside already?
     let vanished = underflow * inverse.abs();
-    let off = 64.0 * U * condition * (ms + lambda.abs() * md) + vanished;
-    let usable = (kappa < 1.0 / (256.0 * U)) & (vanished < 1.0) & (lambda.abs() + md + m1 + m2 + ms < LARGE);
+    let off = 64.0 * U * condition * (ms + lambda.abs() * md) + vanished + SMALL;
+    let usable =
+        (kappa < 1.0 / (256.0 * U)) & (vanished < 1.0) & (lambda.abs() + det.abs() + md + m1 + m2 + ms < LARGE);
     if usable & ((lambda + off < within.min) | (lambda - off > within.max)) {
         return None;
     }
@@ -87,7 +88,7 @@ pub fn intersect_with<P: Product>(ray: &Ray, vertices: &[DVec3; 3], within: Inte
         condition * (U * (largest(r) * (87.0 + 355.0 * kappa) + 150.0 * (U * size))) + vanished * (1.0 + m12 + size);
     let error = U * lambda.abs() + beyond_rounding;
     let inside = (lambda - error > within.min) & (lambda + error < within.max);
-    if !(usable & (beyond_rounding <= 3.0 * U * lambda.abs()) & inside) {
+    if !(usable & (lambda.abs() > SMALL) & (beyond_rounding < 3.0 * U * lambda.abs()) & inside) {
         return refine(ray, vertices, within);
     }
     Some(Hit { lambda, error: error * (1.0 + 4.0 * U), uv: weights(u + du, v + dv), part: 0 })
@@ -95,6 +96,8 @@ pub fn intersect_with<P: Product>(ray: &Ray, vertices: &[DVec3; 3], within: Inte
 
 /// Where splitting a factor could overflow; the fast path stays below, so that both ways of it give the same bits.
 const LARGE: f64 = f64::from_bits((1023 + 900) << 52);
+/// Above this, what underflows in the bound of λ is less than the last place of its rounding.
+const SMALL: f64 = f64::from_bits((1023 - 900) << 52);
 
 #[inline(always)]
 fn largest(v: DVec3) -> f64 {
