@@ -2,9 +2,11 @@
 
 mod support;
 
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use support::cases::{Family, Kernel};
 use support::families;
-use support::sweep::{Answer, Row, TEXTBOOK, quantile, sweep};
+use support::sweep::{Contender, Row, SHIPPED, TEXTBOOK, quantile, sweep};
 
 /// Families in which everything is a miss.
 const ALL_MISS: [(Kernel, u32); 8] = [
@@ -42,10 +44,35 @@ fn print(family: &Family, row: &Row) {
     );
 }
 
-fn rows(kernel: Kernel, answer: Answer, ordinary: usize, hard: usize) -> Vec<(Family, Row)> {
+/// Every family of one kernel: `ordinary` cases of its ordinary rays, `hard` of all others together.
+fn rows(contender: &Contender, kernel: Kernel, ordinary: usize, hard: usize) -> Vec<(Family, Row)> {
+    const CHUNK: usize = 2000;
     let families: Vec<Family> = families::all().into_iter().filter(|f| f.kernel == kernel).collect();
     let each = hard / (families.len() - 1);
-    families.into_iter().map(|f| (f, sweep(&f, answer, 0..if f.number == 0 { ordinary } else { each }))).collect()
+    let chunks: Vec<(usize, std::ops::Range<usize>)> = (0..families.len())
+        .flat_map(|k| {
+            let n = if families[k].number == 0 { ordinary } else { each };
+            (0..n).step_by(CHUNK).map(move |start| (k, start..(start + CHUNK).min(n)))
+        })
+        .collect();
+    let rows = Mutex::new(vec![Row::default(); families.len()]);
+    let next = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                loop {
+                    let i = next.fetch_add(1, Ordering::Relaxed);
+                    let Some((k, range)) = chunks.get(i) else { break };
+                    let row = sweep(&families[*k], contender.answer, range.clone());
+                    rows.lock().unwrap()[*k].merge(row);
+                    if i % 500 == 499 {
+                        eprintln!("{}: {} of {} chunks", kernel.name(), i + 1, chunks.len());
+                    }
+                }
+            });
+        }
+    });
+    families.into_iter().zip(rows.into_inner().unwrap()).collect()
 }
 
 /// The harness sees what is known to be wrong: the textbook kernels err on hard cases, and on ordinary ones hardly.
@@ -53,7 +80,7 @@ fn rows(kernel: Kernel, answer: Answer, ordinary: usize, hard: usize) -> Vec<(Fa
 fn textbook_kernels_show_their_errors() {
     header();
     for contender in TEXTBOOK[0] {
-        let rows = rows(contender.kernels[0], contender.answer, 2000, 4000);
+        let rows = rows(&contender, contender.kernels[0], 2000, 4000);
         println!("{}", contender.name);
         for (family, row) in &rows {
             print(family, row);
@@ -66,4 +93,51 @@ fn textbook_kernels_show_their_errors() {
         let wrong: usize = rows.iter().map(|(_, row)| row.wrong()).sum();
         assert!(wrong > 0, "{} is never wrong on hard cases?", contender.name);
     }
+}
+
+/// The contract of every shipped kernel: no wrong decision, no wrong part, no broken bound, λ within its ulps.
+fn check_shipped(ordinary: usize, hard: usize) {
+    header();
+    let mut broken = Vec::new();
+    for contender in SHIPPED {
+        for &kernel in contender.kernels {
+            for (family, row) in rows(contender, kernel, ordinary, hard) {
+                print(&family, &row);
+                for (what, case) in &row.failures {
+                    broken.push(format!("{} {} {}: {what}: {}", kernel.name(), family.number, family.name, case.hex()));
+                }
+                if let Some((ulps, case)) = &row.worst
+                    && !(*ulps <= kernel.contract())
+                {
+                    broken.push(format!(
+                        "{} {} {}: {ulps} ulp: {}",
+                        kernel.name(),
+                        family.number,
+                        family.name,
+                        case.hex()
+                    ));
+                }
+                assert_eq!(
+                    row.hits == 0,
+                    ALL_MISS.contains(&(kernel, family.number)),
+                    "{}: {} hits",
+                    family.name,
+                    row.hits
+                );
+            }
+        }
+    }
+    assert!(broken.is_empty(), "\n{}", broken.join("\n"));
+}
+
+#[test]
+fn shipped_kernels_keep_their_contract() {
+    check_shipped(50_000, 50_000);
+}
+
+/// `cargo test --release --test exact -- --ignored --nocapture`: 1e7 cases a kernel.
+#[test]
+#[ignore = "an hour or so"]
+fn shipped_kernels_keep_their_contract_ten_million_times() {
+    check_shipped(5_000_000, 5_000_000);
 }

@@ -18,11 +18,11 @@ pub struct Measure {
 
 pub fn measure(hit: &Hit, exact: &Enclosure, scale: f64) -> Measure {
     let size = exact.to_f64().abs();
-    if !hit.lambda.is_finite() {
-        // Right only where the exact λ is beyond the largest float.
-        let beyond = size > f64::MAX || size.is_infinite();
+    if !hit.lambda.is_finite() || size.is_infinite() {
+        // An exact λ beyond the largest float has no float near it: the largest or ∞ will do, with no bound.
+        let right = size.is_infinite() && hit.lambda.abs() >= f64::MAX && hit.error == f64::INFINITY;
         return Measure {
-            ulps: if beyond { 0.0 } else { f64::INFINITY },
+            ulps: if right { 0.0 } else { f64::INFINITY },
             violated: hit.error != f64::INFINITY,
             tightness: f64::INFINITY,
         };

@@ -5,7 +5,7 @@ use super::measure::{measure, scale};
 use super::oracle::truth;
 use truehit::Hit;
 use truehit::glam::{DVec2, DVec3};
-use truehit::kernel::textbook;
+use truehit::kernel::{textbook, triangle};
 
 /// What a kernel answers to a case; `None` for shapes it does not know.
 pub type Answer = fn(&Case) -> Option<Hit>;
@@ -193,3 +193,13 @@ macro_rules! textbook {
 
 /// The textbook kernels, f64 first.
 pub const TEXTBOOK: [[Contender; 11]; 2] = [textbook!(f64, "f64"), textbook!(f32, "f32")];
+
+/// The crate's own kernels.
+pub const SHIPPED: &[Contender] = &[Contender {
+    name: "triangle",
+    kernels: &[Kernel::Triangle],
+    answer: |c| match &c.solid {
+        Solid::Triangle(v) => triangle::intersect(&c.ray, v, c.within),
+        _ => None,
+    },
+}];
