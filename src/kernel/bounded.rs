@@ -88,8 +88,9 @@ impl Number for Bounded {
             let relative = if self.hi == 0.0 && self.error == 0.0 { 0.0 } else { f64::INFINITY };
             return (Scaled::ZERO, relative);
         }
-        let relative = self.error / (self.hi.abs() - self.error) * (1.0 + 16.0 * U);
-        let relative = if relative >= 0.0 { relative } else { f64::INFINITY };
+        // |exact| ≥ |hi|(1 − u) − error. Half is nothing to build on, and a NaN is not below it.
+        let known = self.error < 0.5 * self.hi.abs();
+        let relative = if known { self.error / (self.hi.abs() - self.error) * (1.0 + 16.0 * U) } else { f64::INFINITY };
         (Scaled::new(self.hi, self.lo, 0), relative)
     }
 }
