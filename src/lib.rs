@@ -10,6 +10,7 @@ mod ray;
 mod scene;
 pub mod shading;
 mod shape;
+mod shapes;
 pub mod signature;
 mod surface;
 
@@ -23,4 +24,5 @@ pub use raster::Raster;
 pub use ray::Ray;
 pub use scene::{Scene, SceneBuilder, SceneHit};
 pub use shape::{Shape, SurfacePoint};
+pub use shapes::{Plane, Triangle};
 pub use surface::Surface;

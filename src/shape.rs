@@ -83,8 +83,8 @@ pub trait Shape: Debug + Send + Sync {
 pub struct SurfacePoint {
     /// Where.
     pub position: DVec3,
-    /// `position` is at most this far from the surface. Along the surface it is off the exact hit by at most this plus
-    /// the hit's `error` times the length of the ray's direction.
+    /// `position` is at most this far from the surface. Along the surface it is off the exact hit by at most the hit's
+    /// `error` times the length of the ray's direction, plus a few units in the last place of the coordinates.
     pub error: f64,
 }
 

@@ -1,10 +1,15 @@
 //! Planes, triangles, polygons, boxes and affine maps against exact arithmetic on big integers.
 
+mod support;
+
 use dashu::integer::IBig;
 use std::cmp::Ordering;
 use std::fmt::Debug;
+use support::cases::{Case, Kernel, Solid};
+use support::families;
+use support::sweep::{quantile, sweep};
 use truehit::glam::DVec3;
-use truehit::kernel::{eft, triangle};
+use truehit::kernel::{eft, plane, triangle};
 use truehit::{Hit, Interval, Ray};
 
 /// m·2^e, exactly: dashu's integers, nothing of truehit's.
@@ -431,4 +436,51 @@ fn comparisons_of_two_triangles_are_exact() {
     }
     println!("compare: less, equal, greater {seen:?}");
     assert!(seen.iter().all(|&n| n > 1000));
+}
+
+/// Every family of `kernel`: nothing wrong, every bound holds, λ within the contract, both products the same bits.
+fn families_of(kernel: Kernel, cases: usize, answer: fn(&Case) -> Option<Hit>) {
+    let mut hits = 0;
+    for family in families::all().into_iter().filter(|f| f.kernel == kernel) {
+        let row = sweep(&family, answer, 0..cases);
+        println!(
+            "{:<9} {:>3} {:<40} cases {} hits {:>6} wrong {} violated {} max ulp {:.4} median bound/err {:.2}",
+            kernel.name(),
+            family.number,
+            family.name,
+            row.cases,
+            row.hits,
+            row.wrong(),
+            row.violations,
+            row.max_ulps(),
+            quantile(&row.tightness, 0.5),
+        );
+        for (what, case) in &row.failures {
+            println!("{what}: {}", case.hex());
+        }
+        assert_eq!((row.wrong(), row.violations), (0, 0), "{}", family.name);
+        assert!(row.max_ulps() <= kernel.contract(), "{}", family.name);
+        hits += row.hits;
+    }
+    assert!(hits > cases, "only {hits} hits");
+}
+
+#[test]
+fn planes_in_every_family() {
+    families_of(Kernel::Plane, 3000, |case| {
+        let Solid::Plane { point, normal } = case.solid else { unreachable!() };
+        let hit = plane::intersect(&case.ray, point, normal, case.within);
+        assert_eq!(hit, plane::intersect_with::<eft::Split>(&case.ray, point, normal, case.within));
+        hit
+    });
+}
+
+#[test]
+fn triangles_in_every_family() {
+    families_of(Kernel::Triangle, 2000, |case| {
+        let Solid::Triangle(t) = &case.solid else { unreachable!() };
+        let hit = triangle::intersect(&case.ray, t, case.within);
+        assert_eq!(hit, triangle::intersect_with::<eft::Split>(&case.ray, t, case.within));
+        hit
+    });
 }

@@ -20,3 +20,14 @@ pub const UNDERFLOW: f64 = f64::from_bits((1023 - 1000) << 52); // 2⁻¹⁰⁰�
 /// Triangle, docs/numerics.md §4: each edge function is off by at most 49u·|d|∞·(|e₁||e₂| + |s|(|e₁|+|e₂|)), in largest
 /// components; the last one covers the bound's own arithmetic.
 pub const TRIANGLE_SIDES: f64 = 50.0 * U;
+
+/// Plane, docs/numerics.md §3: λ beyond its last rounding is off by this times u²κ(P_N/|D| + |λ|κ), where P are the sums of
+/// the products' absolute values and κ = P_D/|D|.
+pub const PLANE_QUOTIENT: f64 = 160.0 * U * U;
+
+/// Where splitting a factor could overflow; fast paths stay below, so that both kinds of
+/// [`Product`](super::eft::Product) give the same bits.
+pub const LARGE: f64 = f64::from_bits((1023 + 900) << 52);
+
+/// Above this, what underflows in a bound of λ is less than the last place of the bound.
+pub const SMALL: f64 = f64::from_bits((1023 - 900) << 52);

@@ -3,6 +3,7 @@
 //! Sources: Knuth (two-sum), Dekker 1971 and Veltkamp (two-product without FMA), Ogita, Rump, Oishi 2005.
 //! Exact as long as nothing over- or underflows: docs/numerics.md §1.
 
+use glam::DVec3;
 use std::fmt::Debug;
 
 /// (s, e): s = fl(a + b) and s + e = a + b exactly.
@@ -72,6 +73,19 @@ fn split(a: f64) -> (f64, f64) {
     let c = FACTOR * a;
     let hi = c - (c - a);
     (hi, a - hi)
+}
+
+/// o + λd, each component rounded once or nearly: off by (u + 3u²(|oᵢ| + |λdᵢ|)/|result|) of itself.
+#[must_use]
+pub fn step(o: DVec3, lambda: f64, d: DVec3) -> DVec3 {
+    let component = |o: f64, d: f64| {
+        let (p, p_lo) = Split::two_product(lambda, d);
+        let (s, s_lo) = two_sum(o, p);
+        let value = s + (s_lo + p_lo);
+        // Splitting overflows before the product does.
+        if value.is_nan() { o + p } else { value }
+    };
+    DVec3::new(component(o.x, d.x), component(o.y, d.y), component(o.z, d.z))
 }
 
 #[cfg(test)]

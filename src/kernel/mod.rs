@@ -7,6 +7,7 @@ pub mod dyadic;
 pub mod eft;
 mod fixed;
 pub mod number;
+pub mod plane;
 pub mod ratio;
 pub mod scaled;
 pub mod textbook;

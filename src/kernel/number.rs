@@ -4,7 +4,9 @@
 //! A cold path writes its polynomial once over `N: Number`, evaluates it in `Bounded` and, where that leaves the sign
 //! open, again in `Dyadic`, which never does.
 
-use super::scaled::Scaled;
+use super::bounded::Bounded;
+use super::dyadic::Dyadic;
+use super::scaled::{Scaled, exponent_of, ldexp};
 use glam::DVec3;
 use std::cmp::Ordering;
 
@@ -61,4 +63,35 @@ pub fn dot<N: Number>(a: &Vector<N>, b: &Vector<N>) -> N {
 pub fn cross<N: Number>(a: &Vector<N>, b: &Vector<N>) -> Vector<N> {
     let minor = |i: usize, j: usize| a[i].times(&b[j]).minus(&a[j].times(&b[i]));
     [minor(1, 2), minor(2, 0), minor(0, 1)]
+}
+
+/// v/|v|, if its components are known to more than the last place of the largest; zero for the zero vector.
+pub fn unit<N: Number>(v: &Vector<N>) -> Option<DVec3> {
+    let parts = [v[0].rounded(), v[1].rounded(), v[2].rounded()];
+    let largest = parts.iter().filter(|(x, _)| !x.is_zero()).map(|(x, _)| x.exponent()).max();
+    let Some(top) = largest else {
+        return parts.iter().all(|(_, error)| *error == 0.0).then_some(DVec3::ZERO);
+    };
+    let mut unit = DVec3::ZERO;
+    for (i, (value, relative)) in parts.into_iter().enumerate() {
+        let x = value.shifted(-top).to_f64().0;
+        // A component that is zero or nearly may be unknown in itself and yet be certain to be small.
+        if !(relative * x.abs() < super::bound::U) && v[i].sign() != Some(Ordering::Equal) {
+            return None;
+        }
+        unit[i] = x;
+    }
+    Some(unit.normalize())
+}
+
+/// v/|v| of a finite non-zero vector of any length.
+#[must_use]
+pub fn unit_of(v: DVec3) -> DVec3 {
+    let k = -exponent_of(v.abs().max_element());
+    DVec3::from(v.to_array().map(|x| ldexp(x, k))).normalize()
+}
+
+/// The exact sign of a polynomial: by double-doubles where they can tell, exactly otherwise.
+pub fn sign_of(bounded: impl FnOnce() -> Bounded, exact: impl FnOnce() -> Dyadic) -> Ordering {
+    bounded().sign().or_else(|| exact().sign()).unwrap_or(Ordering::Equal)
 }

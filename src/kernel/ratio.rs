@@ -9,7 +9,7 @@ use super::scaled::{SCALED_ERROR, Scaled};
 use crate::Interval;
 use std::cmp::Ordering;
 
-/// λ = numerator/denominator; the denominator is not zero.
+/// λ = numerator/denominator.
 #[derive(Clone, Copy, Debug)]
 pub struct Ratio<N> {
     /// N.
@@ -78,7 +78,8 @@ impl Ratio<Dyadic> {
     }
 }
 
-/// λ and its error bound where the exact λ lies in `within`: from double-doubles where they do, exactly otherwise.
+/// λ and its error bound where the exact λ lies in `within`: from double-doubles where they will do, exactly otherwise.
+/// A miss where D is zero.
 #[cold]
 pub fn refine(
     bounded: impl FnOnce() -> Ratio<Bounded>,
@@ -86,6 +87,9 @@ pub fn refine(
     within: Interval,
 ) -> Option<(f64, f64)> {
     let ratio = bounded();
+    if ratio.denominator.sign() == Some(Ordering::Equal) {
+        return None;
+    }
     match ratio.is_inside(within) {
         Some(false) => return None,
         Some(true) => {
@@ -96,7 +100,10 @@ pub fn refine(
         None => {}
     }
     let ratio = exact();
-    if ratio.is_inside(within)? { ratio.lambda() } else { None }
+    if ratio.denominator.is_zero() || !ratio.is_inside(within)? {
+        return None;
+    }
+    ratio.lambda()
 }
 
 /// λ to about a hundred bits, as an unevaluated sum.

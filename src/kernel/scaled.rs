@@ -57,6 +57,18 @@ impl Scaled {
         self.hi < 0.0
     }
 
+    /// ⌊log₂|self|⌋; zero for zero.
+    #[must_use]
+    pub fn exponent(self) -> i32 {
+        self.exponent
+    }
+
+    /// self · 2^e.
+    #[must_use]
+    pub fn shifted(self, e: i32) -> Self {
+        if self.is_zero() { self } else { Self { exponent: self.exponent + e, ..self } }
+    }
+
     /// −self.
     #[must_use]
     pub fn negated(self) -> Self {
@@ -163,8 +175,9 @@ impl Scaled {
     }
 }
 
-/// ⌊log₂|x|⌋ of a normal number.
-fn exponent_of(x: f64) -> i32 {
+/// ⌊log₂|x|⌋ of a normal number; −1023 for a subnormal or zero.
+#[must_use]
+pub fn exponent_of(x: f64) -> i32 {
     ((x.to_bits() >> 52) & 0x7ff) as i32 - 1023
 }
 

@@ -5,13 +5,13 @@
 //! weights to the last bit, and its size is the proof. Where the filter is silent the signs are found in integers,
 //! double-doubles or [`Dyadic`]s. docs/numerics.md §4.
 
-use super::bound::{TRIANGLE_SIDES, U, UNDERFLOW};
+use super::bound::{LARGE, SMALL, TRIANGLE_SIDES, U, UNDERFLOW};
 use super::bounded::Bounded;
 use super::cpu;
 use super::dyadic::Dyadic;
 use super::eft::{Fused, Product, Split, two_diff, two_sum};
 use super::fixed;
-use super::number::{Number, cross, difference, dot, vector};
+use super::number::{self, Number, cross, difference, dot, vector};
 use super::ratio::{self, Ratio};
 use crate::{Hit, Interval, Ray};
 use glam::{DVec2, DVec3};
@@ -93,11 +93,6 @@ pub fn intersect_with<P: Product>(ray: &Ray, vertices: &[DVec3; 3], within: Inte
     }
     Some(Hit { lambda, error: error * (1.0 + 4.0 * U), uv: weights(u + du, v + dv), part: 0 })
 }
-
-/// Where splitting a factor could overflow; the fast path stays below, so that both ways of it give the same bits.
-const LARGE: f64 = f64::from_bits((1023 + 900) << 52);
-/// Above this, what underflows in the bound of λ is less than the last place of its rounding.
-const SMALL: f64 = f64::from_bits((1023 - 900) << 52);
 
 #[inline(always)]
 fn largest(v: DVec3) -> f64 {
@@ -237,8 +232,7 @@ pub fn edge_sign(ray: &Ray, a: DVec3, b: DVec3) -> Ordering {
     if let Some(sign) = fixed::edge(ray, a, b) {
         return sign;
     }
-    let decided = form::<Bounded>(ray, a, b).sign().or_else(|| form::<Dyadic>(ray, a, b).sign());
-    decided.unwrap_or(Ordering::Equal)
+    number::sign_of(|| form(ray, a, b), || form(ray, a, b))
 }
 
 /// [`edge_sign`] of the direction d + (ε, ε², ε³) for an ε too small to matter otherwise: never zero, unless the
@@ -264,6 +258,27 @@ pub fn crosses(ray: &Ray, &[a, b, c]: &[DVec3; 3]) -> bool {
     sign != Ordering::Equal && sign == crossing_sign(ray, b, c) && sign == crossing_sign(ray, c, a)
 }
 
+/// The unit normal (b−a)×(c−a)/|…|, each component to a few ulps of the largest however thin the triangle; zero if it is
+/// degenerate. All vertices finite.
+#[must_use]
+pub fn normal(vertices: &[DVec3; 3]) -> DVec3 {
+    fn form<N: Number>(&[a, b, c]: &[DVec3; 3]) -> [N; 3] {
+        cross(&difference(b, a), &difference(c, a))
+    }
+    number::unit(&form::<Bounded>(vertices))
+        .unwrap_or_else(|| number::unit(&form::<Dyadic>(vertices)).unwrap_or_default())
+}
+
+/// The point a + u·(b−a) + v·(c−a), and a bound on its distance from the triangle's plane; u, v ≥ 0.
+#[must_use]
+pub fn point(&[a, b, c]: &[DVec3; 3], uv: DVec2) -> (DVec3, f64) {
+    let (f, g) = (uv.x * (b - a), uv.y * (c - a));
+    let position = a + (f + g);
+    // Each of b−a, its multiple and their sum is rounded, then the sum with a; underflow is below the last place.
+    let off = 3.0 * (f.abs() + g.abs()) + position.abs();
+    (position, U * off.length() * (1.0 + 8.0 * U) + f64::MIN_POSITIVE)
+}
+
 /// On which side of the triangle's plane `point` lies, exactly: the sign of n·(point − a), n = (b−a)×(c−a).
 /// [`Ordering::Equal`] also for a degenerate triangle. All arguments finite.
 #[must_use]
@@ -271,6 +286,5 @@ pub fn side(vertices: &[DVec3; 3], point: DVec3) -> Ordering {
     fn form<N: Number>(&[a, b, c]: &[DVec3; 3], point: DVec3) -> N {
         dot(&cross(&difference(b, a), &difference(c, a)), &difference(point, a))
     }
-    let decided = form::<Bounded>(vertices, point).sign().or_else(|| form::<Dyadic>(vertices, point).sign());
-    decided.unwrap_or(Ordering::Equal)
+    number::sign_of(|| form(vertices, point), || form(vertices, point))
 }
