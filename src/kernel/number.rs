@@ -75,8 +75,9 @@ pub fn unit<N: Number>(v: &Vector<N>) -> Option<DVec3> {
     let mut unit = DVec3::ZERO;
     for (i, (value, relative)) in parts.into_iter().enumerate() {
         let x = value.shifted(-top).to_f64().0;
-        // A component that is zero or nearly may be unknown in itself and yet be certain to be small.
-        if !(relative * x.abs() < super::bound::U) && v[i].sign() != Some(Ordering::Equal) {
+        // A component with no digits of its own is known well enough only if it is zero; NaN is not.
+        let known = relative * x.abs() < super::bound::U || v[i].sign() == Some(Ordering::Equal);
+        if !known {
             return None;
         }
         unit[i] = x;
