@@ -5,7 +5,7 @@ use super::measure::{measure, scale};
 use super::oracle::truth;
 use truehit::Hit;
 use truehit::glam::{DVec2, DVec3};
-use truehit::kernel::{textbook, triangle};
+use truehit::kernel::{plane, textbook, triangle};
 
 /// What a kernel answers to a case; `None` for shapes it does not know.
 pub type Answer = fn(&Case) -> Option<Hit>;
@@ -194,12 +194,18 @@ macro_rules! textbook {
 /// The textbook kernels, f64 first.
 pub const TEXTBOOK: [[Contender; 11]; 2] = [textbook!(f64, "f64"), textbook!(f32, "f32")];
 
+const fn shipped(name: &'static str, kernels: &'static [Kernel], answer: Answer) -> Contender {
+    Contender { name, kernels, answer }
+}
+
 /// The crate's own kernels.
-pub const SHIPPED: &[Contender] = &[Contender {
-    name: "triangle",
-    kernels: &[Kernel::Triangle],
-    answer: |c| match &c.solid {
+pub const SHIPPED: &[Contender] = &[
+    shipped("plane", &[Kernel::Plane], |c| match &c.solid {
+        Solid::Plane { point, normal } => plane::intersect(&c.ray, *point, *normal, c.within),
+        _ => None,
+    }),
+    shipped("triangle", &[Kernel::Triangle], |c| match &c.solid {
         Solid::Triangle(v) => triangle::intersect(&c.ray, v, c.within),
         _ => None,
-    },
-}];
+    }),
+];
