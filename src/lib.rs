@@ -24,5 +24,5 @@ pub use raster::Raster;
 pub use ray::Ray;
 pub use scene::{Scene, SceneBuilder, SceneHit};
 pub use shape::{Shape, SurfacePoint};
-pub use shapes::{Plane, Triangle};
+pub use shapes::{Cone, Cylinder, Patch, Plane, Sphere, Triangle};
 pub use surface::Surface;

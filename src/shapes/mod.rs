@@ -1,7 +1,17 @@
 //! The shapes.
 
+mod cone;
+mod cylinder;
+mod frustum;
+mod local;
+mod patch;
 mod plane;
+mod sphere;
 mod triangle;
 
+pub use cone::Cone;
+pub use cylinder::Cylinder;
+pub use patch::Patch;
 pub use plane::Plane;
+pub use sphere::Sphere;
 pub use triangle::Triangle;

@@ -1,0 +1,274 @@
+//! What cylinder, cone and truncated cone have in common: the capped frustum.
+
+use super::local::{Local, around, length, unit};
+use super::patch::Patch;
+use crate::kernel::bound::U;
+use crate::kernel::frustum::{self, BASE, TOP};
+use crate::{Aabb, Hit, Interval, InvalidShape, Ray, SurfacePoint};
+use glam::{DVec2, DVec3};
+use std::f64::consts::TAU;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Frustum {
+    pub(super) base: DVec3,
+    pub(super) top: DVec3,
+    pub(super) base_radius: f64,
+    pub(super) top_radius: f64,
+}
+
+/// Where λ's own error moves a point by more than this part of the local radius, λ is asked for to a hundred bits.
+const SHARP: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// A hit's point taken apart, in local units: base + height·axis + radial.
+struct Foot {
+    local: Local,
+    /// top − base.
+    axis: DVec3,
+    /// 0 at the base, 1 at the top, never beyond.
+    height: f64,
+    /// Perpendicular to the axis; as long as the point's distance from it before any projection.
+    radial: DVec3,
+    /// The wall's radius at this height.
+    radius: f64,
+}
+
+impl Frustum {
+    /// Checks what all of them refuse; `names` are those of base, top and the two radii.
+    pub(super) fn new(
+        base: DVec3,
+        top: DVec3,
+        base_radius: f64,
+        top_radius: f64,
+        names: [&'static str; 4],
+    ) -> Result<Self, InvalidShape> {
+        for (point, field) in [(base, names[0]), (top, names[1])] {
+            if !point.is_finite() {
+                return Err(InvalidShape::NotFinite { field });
+            }
+        }
+        for (radius, field) in [(base_radius, names[2]), (top_radius, names[3])] {
+            if !radius.is_finite() {
+                return Err(InvalidShape::NotFinite { field });
+            }
+            if radius < 0.0 {
+                return Err(InvalidShape::Negative { field, value: radius });
+            }
+        }
+        if base_radius == 0.0 && top_radius == 0.0 {
+            return Err(InvalidShape::NotPositive { field: names[2], value: base_radius });
+        }
+        if base == top {
+            return Err(InvalidShape::Degenerate { field: names[1] });
+        }
+        Ok(Self { base, top, base_radius, top_radius })
+    }
+
+    #[inline]
+    pub(super) fn intersect(&self, ray: &Ray, within: Interval) -> Option<Hit> {
+        frustum::intersect(ray, self.base, self.top, self.base_radius, self.top_radius, within)
+    }
+
+    pub(super) fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {
+        frustum::precise_lambda(ray, self.base, self.top, self.base_radius, self.top_radius, hit.lambda)
+    }
+
+    fn foot(&self, ray: &Ray, hit: &Hit) -> Foot {
+        let extent = self.base.abs().max(self.top.abs()).max(ray.origin.abs()).max_element();
+        let local = Local::new(extent.max(self.base_radius).max(self.top_radius));
+        let (r0, r1) = (local.length(self.base_radius), local.length(self.top_radius));
+        let axis = local.vector(self.top) - local.vector(self.base);
+        let foot = |lambda| {
+            let x = local.offset(ray, lambda, self.base);
+            let height = along(x, axis);
+            // Twice: what the first subtraction rounds along the axis, the second removes.
+            let radial = x - height * axis;
+            let radial = radial - along(radial, axis) * axis;
+            let height = height.clamp(0.0, 1.0);
+            Foot { local, axis, height, radial, radius: r0 + height * (r1 - r0) }
+        };
+        let rough = foot([hit.lambda, 0.0]);
+        let moved = local.length(hit.error * length(ray.direction));
+        if moved <= SHARP * rough.radius { rough } else { foot(self.precise_lambda(ray, hit)) }
+    }
+
+    pub(super) fn normal(&self, ray: &Ray, hit: &Hit) -> DVec3 {
+        let f = self.foot(ray, hit);
+        let axis = unit(f.axis).unwrap_or(DVec3::Z);
+        match hit.part {
+            BASE => -axis,
+            TOP => axis,
+            _ => self.wall_normal(&f, axis, ray),
+        }
+    }
+
+    /// cos·radial − sin·axis, with tan = Δr/height. At an apex, where no radial direction is left, along the axis.
+    fn wall_normal(&self, f: &Foot, axis: DVec3, ray: &Ray) -> DVec3 {
+        let growth = f.local.length(self.top_radius - self.base_radius);
+        let Some(radial) = unit(f.radial) else {
+            if growth != 0.0 {
+                return -axis * growth.signum();
+            }
+            // A cylinder too thin to be told from its axis: against the ray.
+            let across = ray.direction - along(ray.direction, f.axis) * f.axis;
+            return unit(-across).unwrap_or_else(|| axis.any_orthonormal_vector());
+        };
+        unit(length(f.axis) * radial - growth * axis).unwrap_or(radial)
+    }
+
+    pub(super) fn point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let f = self.foot(ray, hit);
+        let (r0, r1) = (f.local.length(self.base_radius), f.local.length(self.top_radius));
+        let clamped = |r: f64| {
+            let from_axis = length(f.radial);
+            if from_axis <= r { f.radial } else { r * unit(f.radial).unwrap_or(DVec3::ZERO) }
+        };
+        let (foot, radial) = match hit.part {
+            BASE => (self.base, clamped(r0)),
+            TOP => (self.top, clamped(r1)),
+            _ => {
+                // From the nearer end, so that a rim or an apex is met with its own rounding only.
+                let foot = if f.height <= 0.5 {
+                    self.base + f.local.vector_outside(f.height * f.axis)
+                } else {
+                    self.top - f.local.vector_outside((1.0 - f.height) * f.axis)
+                };
+                (foot, f.radius * unit(f.radial).unwrap_or(DVec3::ZERO))
+            }
+        };
+        let radial = f.local.vector_outside(radial);
+        let position = foot + radial;
+        // docs/numerics.md §6: radial direction and its length, the foot, and the two sums.
+        let sizes = 12.0 * self.base_radius.max(self.top_radius)
+            + 6.0 * f.local.outside(length(f.axis))
+            + 2.0 * length(foot)
+            + 2.0 * length(position);
+        SurfacePoint { position, error: U * sizes + f64::from_bits(16) }
+    }
+
+    /// The box around both caps' circles: a circle of radius r across unit axis a reaches r·√(1 − aᵢ²) along i.
+    pub(super) fn bounds(&self) -> Aabb {
+        let local = Local::new(self.top.abs().max(self.base.abs()).max_element());
+        let v = local.vector(self.top) - local.vector(self.base);
+        let v = unit(v).unwrap_or(DVec3::Z);
+        // Half-widths of a unit circle, rounded up: v is off by less than 8u relatively, in every component that has
+        // not vanished in scaling.
+        let along = self.top.cmpne(self.base);
+        let reach = [0, 1, 2].map(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let up = v[j].hypot(v[k]) * (1.0 + 32.0 * U) + f64::MIN_POSITIVE;
+            if along.test(j) || along.test(k) { up.min(1.0) } else { 0.0 }
+        });
+        let disc = |center: DVec3, r: f64| {
+            let [x, y, z] = [0, 1, 2].map(|i| {
+                let half = if reach[i] == 0.0 || r == 0.0 { 0.0 } else { (r * reach[i]).next_up().min(r) };
+                around(center[i], half)
+            });
+            Aabb::new([x.0, y.0, z.0], [x.1, y.1, z.1])
+        };
+        disc(self.base, self.base_radius).union(disc(self.top, self.top_radius))
+    }
+
+    pub(super) fn texture_coordinates(&self, ray: &Ray, hit: &Hit) -> DVec2 {
+        let f = self.foot(ray, hit);
+        let (e1, e2) = unit(f.axis).unwrap_or(DVec3::Z).any_orthonormal_pair();
+        let (x, y) = (f.radial.dot(e1), f.radial.dot(e2));
+        let planar = |r: f64| {
+            let r = f.local.length(r);
+            DVec2::new(0.5 + 0.5 * x / r, 0.5 + 0.5 * y / r).clamp(DVec2::ZERO, DVec2::ONE)
+        };
+        match hit.part {
+            BASE => planar(self.base_radius),
+            TOP => planar(self.top_radius),
+            _ => {
+                let angle = y.atan2(x) / TAU;
+                DVec2::new(if angle < 0.0 { angle + 1.0 } else { angle }, f.height)
+            }
+        }
+    }
+
+    pub(super) fn departs(&self, ray: &Ray, outward: bool) -> bool {
+        let side = frustum::side(ray.origin, self.base, self.top, self.base_radius, self.top_radius);
+        if outward { side.is_gt() && self.intersect(ray, Interval::FORWARD).is_none() } else { side.is_lt() }
+    }
+
+    /// A cone's wall curves at most as its circle does (by the cosine less).
+    pub(super) fn curvature(&self, ray: &Ray, hit: &Hit) -> f64 {
+        if hit.part == BASE || hit.part == TOP {
+            return 0.0;
+        }
+        let f = self.foot(ray, hit);
+        1.0 / f.local.outside(f.radius * (1.0 - 16.0 * U))
+    }
+
+    /// Half of ∇f for f(p) = |x|² − t²/h² − R(t)², with x = p − base, t = x·v, v = top − base, h² = |v|².
+    pub(super) fn gradient(&self, point: DVec3) -> DVec3 {
+        let (v, x) = (self.top - self.base, point - self.base);
+        let height = along(x, v);
+        let growth = self.top_radius - self.base_radius;
+        x - height * v - (self.base_radius + height * growth) * growth / v.length_squared() * v
+    }
+
+    /// The wall's explicit form: angle in radians, height from 0 to 1.
+    pub(super) fn patch(&self, angle: f64, height: f64) -> Patch {
+        let v = self.top - self.base;
+        let (e1, e2) = unit(v).unwrap_or(DVec3::Z).any_orthonormal_pair();
+        let (s, c) = angle.sin_cos();
+        let (growth, outward) = (self.top_radius - self.base_radius, c * e1 + s * e2);
+        let radius = self.base_radius + height * growth;
+        Patch {
+            point: self.base + height * v + radius * outward,
+            around: radius * (c * e2 - s * e1),
+            along: v + growth * outward,
+        }
+    }
+}
+
+/// x·axis/|axis|², whatever the axis's range.
+fn along(x: DVec3, axis: DVec3) -> f64 {
+    let local = Local::new(axis.abs().max_element());
+    let axis = local.vector(axis);
+    local.vector(x).dot(axis) / axis.length_squared()
+}
+
+/// Implements [`Shape`](crate::Shape) for a newtype around [`Frustum`].
+macro_rules! shape_by_frustum {
+    ($name:ident) => {
+        impl crate::Shape for $name {
+            #[inline]
+            fn intersect(&self, ray: &crate::Ray, within: crate::Interval) -> Option<crate::Hit> {
+                self.0.intersect(ray, within)
+            }
+
+            /// Accurate to a few ulps near the solid and to 2⁻⁴⁰ from any distance. By part on a rim; at an apex
+            /// outward along the axis.
+            fn normal(&self, ray: &crate::Ray, hit: &crate::Hit) -> glam::DVec3 {
+                self.0.normal(ray, hit)
+            }
+
+            fn bounds(&self) -> crate::Aabb {
+                self.0.bounds()
+            }
+
+            fn texture_coordinates(&self, ray: &crate::Ray, hit: &crate::Hit) -> glam::DVec2 {
+                self.0.texture_coordinates(ray, hit)
+            }
+
+            fn point(&self, ray: &crate::Ray, hit: &crate::Hit) -> crate::SurfacePoint {
+                self.0.point(ray, hit)
+            }
+
+            fn departs(&self, ray: &crate::Ray, _hit: &crate::Hit, outward: bool) -> bool {
+                self.0.departs(ray, outward)
+            }
+
+            fn curvature(&self, ray: &crate::Ray, hit: &crate::Hit) -> f64 {
+                self.0.curvature(ray, hit)
+            }
+
+            fn precise_lambda(&self, ray: &crate::Ray, hit: &crate::Hit) -> [f64; 2] {
+                self.0.precise_lambda(ray, hit)
+            }
+        }
+    };
+}
+pub(super) use shape_by_frustum;

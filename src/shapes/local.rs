@@ -1,0 +1,121 @@
+//! A hit's point in a shape's own place and scale: what normals and projected points are made of.
+
+use crate::Ray;
+use crate::kernel::eft::{Product, Split, two_diff, two_sum};
+use crate::kernel::scaled::ldexp;
+use glam::DVec3;
+
+/// Lengths are divided by 2^exponent, so that squares neither overflow nor vanish.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Local {
+    exponent: i32,
+}
+
+impl Local {
+    /// For lengths up to `largest`; none are changed unless they are extreme.
+    pub(super) fn new(largest: f64) -> Self {
+        let ordinary = 1e-90..1e90;
+        Self { exponent: if ordinary.contains(&largest) { 0 } else { exponent(largest) } }
+    }
+
+    /// A length in local units.
+    pub(super) fn length(self, x: f64) -> f64 {
+        scaled(x, -self.exponent)
+    }
+
+    /// A vector in local units.
+    pub(super) fn vector(self, v: DVec3) -> DVec3 {
+        if self.exponent == 0 { v } else { v.map(|x| self.length(x)) }
+    }
+
+    /// A local length outside.
+    pub(super) fn outside(self, x: f64) -> f64 {
+        scaled(x, self.exponent)
+    }
+
+    /// A local vector outside.
+    pub(super) fn vector_outside(self, v: DVec3) -> DVec3 {
+        if self.exponent == 0 { v } else { v.map(|x| self.outside(x)) }
+    }
+
+    /// origin + (λ₀ + λ₁)·direction − `from`, rounded once or twice: the parts that cancel do so exactly.
+    pub(super) fn offset(self, ray: &Ray, lambda: [f64; 2], from: DVec3) -> DVec3 {
+        let (o, from) = (self.vector(ray.origin), self.vector(from));
+        let longest = ray.direction.abs().max_element();
+        let step = if (1e-150..1e150).contains(&longest) { 0 } else { exponent(longest) };
+        let d = if step == 0 { ray.direction } else { ray.direction.map(|x| scaled(x, -step)) };
+        let [l, rest] = lambda.map(|l| scaled(l, step - self.exponent));
+        let component = |i: usize| {
+            let (x, x_lo) = two_diff(o[i], from[i]);
+            let (p, p_lo) = Split::two_product(l, d[i]);
+            let (s, s_lo) = two_sum(x, p);
+            s + (s_lo + (x_lo + p_lo + rest * d[i]))
+        };
+        DVec3::new(component(0), component(1), component(2))
+    }
+}
+
+/// `v` over its length, whatever that is; `None` for zero, infinite or NaN.
+pub(super) fn unit(v: DVec3) -> Option<DVec3> {
+    let longest = v.abs().max_element();
+    if !(longest > 0.0 && longest.is_finite() && v.is_finite()) {
+        return None;
+    }
+    let v = if (1e-100..1e100).contains(&longest) { v } else { v.map(|x| scaled(x, -exponent(longest))) };
+    Some(v / v.length())
+}
+
+/// |v|, whatever its range.
+pub(super) fn length(v: DVec3) -> f64 {
+    let local = Local::new(v.abs().max_element());
+    local.outside(local.vector(v).length())
+}
+
+/// e with 2^e ≤ x < 2^(e + 1); 0 for 0.
+fn exponent(x: f64) -> i32 {
+    match ((x.to_bits() >> 52) & 0x7ff) as i32 {
+        0 if x == 0.0 => 0,
+        0 => -1074 + (63 - x.to_bits().leading_zeros() as i32),
+        e => e - 1023,
+    }
+}
+
+fn scaled(x: f64, e: i32) -> f64 {
+    if e == 0 { x } else { ldexp(x, e) }
+}
+
+/// The float below `x` − `y` or at it, and the one above `x` + `y` or at it.
+pub(super) fn around(x: f64, y: f64) -> (f64, f64) {
+    let (low, low_rest) = two_diff(x, y);
+    let (high, high_rest) = two_sum(x, y);
+    // A rest of NaN (overflow) steps outward too.
+    (
+        if low_rest >= 0.0 { low } else { low.next_down() },
+        if high_rest <= 0.0 { high } else { high.next_up() },
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_and_lengths_have_no_range() {
+        for e in [-1074, -1000, -540, 0, 540, 1000] {
+            let v = DVec3::new(3.0, 0.0, 4.0).map(|x| ldexp(x, e));
+            assert_eq!(length(v), ldexp(5.0, e), "{e}");
+            let u = unit(v).unwrap();
+            assert!((u - DVec3::new(0.6, 0.0, 0.8)).length() < 1e-15, "{e}: {u}");
+        }
+        assert_eq!(unit(DVec3::ZERO), None);
+        assert_eq!(unit(DVec3::new(f64::NAN, 1.0, 0.0)), None);
+    }
+
+    #[test]
+    fn sums_are_rounded_outward_and_only_if_they_must() {
+        assert_eq!(around(1.0, 0.5), (0.5, 1.5));
+        assert_eq!(around(1.0, 1e-30), (1.0f64.next_down(), 1.0f64.next_up()));
+        assert_eq!(around(f64::MAX, f64::MAX).1, f64::INFINITY);
+        assert_eq!(around(0.1, 0.2).1, 0.1 + 0.2);
+    }
+}
