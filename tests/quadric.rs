@@ -89,7 +89,11 @@ fn lattice_frustum(rng: &mut Rng) -> Solid {
     let base = rng.small(2);
     let mut axis = DVec3::ZERO;
     while axis == DVec3::ZERO {
-        axis = if rng.chance(0.5) { rng.small(2) } else { [DVec3::X, DVec3::Y, DVec3::Z][rng.below(3) as usize] * rng.eighths(3) };
+        axis = if rng.chance(0.5) {
+            rng.small(2)
+        } else {
+            [DVec3::X, DVec3::Y, DVec3::Z][rng.below(3) as usize] * rng.eighths(3)
+        };
     }
     let r = 0.125 + rng.eighths(2).abs();
     let (base_radius, top_radius) = match rng.below(4) {
@@ -127,11 +131,14 @@ fn lattice_case(rng: &mut Rng) -> Case {
         1 => [DVec3::X, DVec3::Y, DVec3::Z][rng.below(3) as usize] * rng.sign(),
         2 => rng.small(1),
         // Along a generator, where the lattice has one.
-        3 => top - base + (top_radius - base_radius) * [DVec3::X, DVec3::Y, DVec3::Z][rng.below(3) as usize] * rng.sign(),
+        3 => {
+            top - base + (top_radius - base_radius) * [DVec3::X, DVec3::Y, DVec3::Z][rng.below(3) as usize] * rng.sign()
+        }
         _ => q - p,
     };
     let origin = p - d * rng.eighths(2);
-    let within = [Interval::FORWARD, Interval::LINE, Interval::new(rng.eighths(2), rng.eighths(2)), Interval::new(-0.0, 1.0)];
+    let within =
+        [Interval::FORWARD, Interval::LINE, Interval::new(rng.eighths(2), rng.eighths(2)), Interval::new(-0.0, 1.0)];
     Case { within: within[rng.below(4) as usize], ..Case::new(origin, d, solid) }
 }
 
@@ -180,7 +187,11 @@ fn ordinary_frustum(rng: &mut Rng, distance: f64, kind: u64) -> Case {
     let size = r.max(axis.length()).max(top_radius);
     let target = base + axis * rng.uniform(0.0, 1.0) + rng.unit() * size * rng.uniform(0.0, 1.2);
     let u = rng.unit();
-    Case::new(target - u * distance * size, u * rng.length(), Solid::Frustum { base, top: base + axis, base_radius, top_radius })
+    Case::new(
+        target - u * distance * size,
+        u * rng.length(),
+        Solid::Frustum { base, top: base + axis, base_radius, top_radius },
+    )
 }
 
 #[test]
@@ -188,7 +199,8 @@ fn ordinary_frusta() {
     for (kind, name) in [(0, "cylinder"), (1, "cone"), (2, "truncated cone")] {
         for distance in [0.0, 0.5, 5.0, 1e3, 1e6, 1e9] {
             let n = if distance == 5.0 { 20_000 } else { 5_000 };
-            let mut t = run(&format!("{name} from {distance} sizes"), n, 4.0, |rng| ordinary_frustum(rng, distance, kind));
+            let mut t =
+                run(&format!("{name} from {distance} sizes"), n, 4.0, |rng| ordinary_frustum(rng, distance, kind));
             assert!(t.hits * 5 > t.cases && t.tightness() < 8.0);
         }
     }
@@ -214,12 +226,22 @@ fn spheres() {
         Case::new(origin, rng.unit() * rng.length(), Solid::Sphere { center, radius })
     });
     run("sphere on a lattice", 40_000, 1.0, |rng| {
-        let solid = Solid::Sphere { center: rng.small(2), radius: [1.0, 1.25, 1.5, 3.0, 0.625, 2.125][rng.below(6) as usize] };
+        let solid =
+            Solid::Sphere { center: rng.small(2), radius: [1.0, 1.25, 1.5, 3.0, 0.625, 2.125][rng.below(6) as usize] };
         let mut d = DVec3::ZERO;
         while d == DVec3::ZERO {
-            d = if rng.chance(0.5) { rng.small(2) } else { [DVec3::X, DVec3::Y, DVec3::Z][rng.below(3) as usize] * rng.sign() };
+            d = if rng.chance(0.5) {
+                rng.small(2)
+            } else {
+                [DVec3::X, DVec3::Y, DVec3::Z][rng.below(3) as usize] * rng.sign()
+            };
         }
-        let within = [Interval::FORWARD, Interval::LINE, Interval::new(rng.eighths(2), rng.eighths(2)), Interval::new(-0.0, 1.0)];
+        let within = [
+            Interval::FORWARD,
+            Interval::LINE,
+            Interval::new(rng.eighths(2), rng.eighths(2)),
+            Interval::new(-0.0, 1.0),
+        ];
         Case { within: within[rng.below(4) as usize], ..Case::new(rng.small(3), d, solid) }
     });
     for distance in [3.0, 1e5] {
@@ -235,8 +257,7 @@ fn spheres() {
         let mut case = ordinary_sphere(rng, 3.0);
         if let Some(t) = truth(&case) {
             let limit = nudged(t.lambda.enclosure().to_f64(), rng.integer(-1, 2));
-            case.within =
-                if rng.chance(0.5) { Interval::new(limit, f64::INFINITY) } else { Interval::new(0.0, limit) };
+            case.within = if rng.chance(0.5) { Interval::new(limit, f64::INFINITY) } else { Interval::new(0.0, limit) };
         }
         case
     });

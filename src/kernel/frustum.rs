@@ -56,14 +56,7 @@ pub fn side(point: DVec3, base: DVec3, top: DVec3, base_radius: f64, top_radius:
 
 /// λ of the hit at about `lambda`, to a hundred bits, as an unevaluated sum.
 #[must_use]
-pub fn precise_lambda(
-    ray: &Ray,
-    base: DVec3,
-    top: DVec3,
-    base_radius: f64,
-    top_radius: f64,
-    lambda: f64,
-) -> [f64; 2] {
+pub fn precise_lambda(ray: &Ray, base: DVec3, top: DVec3, base_radius: f64, top_radius: f64, lambda: f64) -> [f64; 2] {
     let solid = Solid { base, top, base_radius, top_radius };
     if !ray.is_valid() || !solid.is_valid() {
         return [lambda, 0.0];

@@ -40,8 +40,10 @@ pub(super) enum End<'a, N> {
     Rising(&'a Quadratic<N>),
 }
 
-/// λ is good enough if it is known to this relative error: a thousandth of an ulp.
-const SHARP: f64 = super::bound::U / 1024.0;
+/// λ is good enough if it is known to a thousandth of an ulp; a NaN is not.
+fn is_sharp(relative: f64) -> bool {
+    relative <= super::bound::U / 1024.0
+}
 
 impl<N: Number> End<'_, N> {
     /// λ and a bound on its relative error; infinite where it is not known.
@@ -148,7 +150,7 @@ pub(super) fn nearest<N: Number>(ends: [(End<N>, u32); 2], within: Interval) -> 
 
 fn hit<N: Number>(end: &End<N>, part: u32) -> Result<Hit, Undecided> {
     let (exact, relative) = end.lambda();
-    if !(relative <= SHARP) {
+    if !is_sharp(relative) {
         return Err(Undecided);
     }
     let (lambda, rounding) = exact.to_f64();
@@ -163,7 +165,7 @@ fn hit<N: Number>(end: &End<N>, part: u32) -> Result<Hit, Undecided> {
 pub(super) fn precise<N: Number>(ends: &[End<N>; 2], lambda: f64) -> Result<[f64; 2], Undecided> {
     let (enter, enter_error) = ends[0].lambda();
     let (exit, exit_error) = ends[1].lambda();
-    if !(enter_error <= SHARP && exit_error <= SHARP) {
+    if !is_sharp(enter_error) || !is_sharp(exit_error) {
         return Err(Undecided);
     }
     let at = Scaled::new(lambda, 0.0, 0);

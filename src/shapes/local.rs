@@ -89,10 +89,7 @@ pub(super) fn around(x: f64, y: f64) -> (f64, f64) {
     let (low, low_rest) = two_diff(x, y);
     let (high, high_rest) = two_sum(x, y);
     // A rest of NaN (overflow) steps outward too.
-    (
-        if low_rest >= 0.0 { low } else { low.next_down() },
-        if high_rest <= 0.0 { high } else { high.next_up() },
-    )
+    (if low_rest >= 0.0 { low } else { low.next_down() }, if high_rest <= 0.0 { high } else { high.next_up() })
 }
 
 #[cfg(test)]

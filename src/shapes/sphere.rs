@@ -94,10 +94,8 @@ impl Shape for Sphere {
     fn normal(&self, ray: &Ray, hit: &Hit) -> DVec3 {
         let largest = ray.origin.abs().max(self.center.abs()).max_element().max(self.radius);
         let local = Local::new(largest);
-        let mut lambda = [hit.lambda, 0.0];
-        if !(hit.error * length(ray.direction) <= SHARP * self.radius) {
-            lambda = self.precise_lambda(ray, hit);
-        }
+        let sharp = hit.error * length(ray.direction) <= SHARP * self.radius;
+        let lambda = if sharp { [hit.lambda, 0.0] } else { self.precise_lambda(ray, hit) };
         let against = || unit(-ray.direction).unwrap_or(DVec3::Z);
         unit(local.offset(ray, lambda, self.center)).unwrap_or_else(against)
     }

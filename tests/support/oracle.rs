@@ -194,8 +194,12 @@ pub fn frustum(line: &Line, base: DVec3, top: DVec3, r0: f64, r1: f64) -> Option
         }
         Inside { enter: None, exit: None }
     } else {
-        let at = |z: Big, part: u32| Truth { lambda: Real::Ratio(z - &oz, dz.clone()), parts: [part; 4] };
-        let ends = (at(Big::zero(), BASE), at(h2.clone(), TOP));
+        // A cap of radius zero is an apex, which is the wall's as well.
+        let at = |z: Big, part: u32, r: f64| {
+            let wall = if r == 0.0 { WALL } else { part };
+            Truth { lambda: Real::Ratio(z - &oz, dz.clone()), parts: [part, wall, wall, wall] }
+        };
+        let ends = (at(Big::zero(), BASE, r0), at(h2.clone(), TOP, r1));
         let (enter, exit) = if dz.sign().is_gt() { ends } else { (ends.1, ends.0) };
         Inside { enter: Some(enter), exit: Some(exit) }
     };

@@ -5,7 +5,7 @@ use super::measure::{measure, scale};
 use super::oracle::truth;
 use truehit::Hit;
 use truehit::glam::{DVec2, DVec3};
-use truehit::kernel::{plane, textbook, triangle};
+use truehit::kernel::{frustum, plane, sphere, textbook, triangle};
 
 /// What a kernel answers to a case; `None` for shapes it does not know.
 pub type Answer = fn(&Case) -> Option<Hit>;
@@ -206,6 +206,16 @@ pub const SHIPPED: &[Contender] = &[
     }),
     shipped("triangle", &[Kernel::Triangle], |c| match &c.solid {
         Solid::Triangle(v) => triangle::intersect(&c.ray, v, c.within),
+        _ => None,
+    }),
+    shipped("sphere", &[Kernel::Sphere], |c| match &c.solid {
+        Solid::Sphere { center, radius } => sphere::intersect(&c.ray, *center, *radius, c.within),
+        _ => None,
+    }),
+    shipped("frustum", &[Kernel::Cylinder, Kernel::Cone], |c| match &c.solid {
+        Solid::Frustum { base, top, base_radius, top_radius } => {
+            frustum::intersect(&c.ray, *base, *top, *base_radius, *top_radius, c.within)
+        }
         _ => None,
     }),
 ];
