@@ -1,6 +1,6 @@
 //! Axis-aligned boxes.
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 /// A closed axis-aligned box; flat and single-point boxes are boxes too. Infinite limits are legal: a plane's box.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +27,38 @@ impl Aabb {
     #[must_use]
     pub fn around(points: &[DVec3]) -> Self {
         points.iter().fold(Self::EMPTY, |b, &p| b.union(Self { min: p, max: p }))
+    }
+
+    /// A box around the images of `points` under `map`: little larger than rounding makes necessary, the entries of the
+    /// map taken to be rounded too.
+    #[must_use]
+    pub fn around_images(points: &[DVec3], map: &DAffine3) -> Self {
+        let (m, t) = (map.matrix3, map.translation);
+        points.iter().fold(Self::EMPTY, |b, p| {
+            let size = m.x_axis.abs() * p.x.abs() + m.y_axis.abs() * p.y.abs() + m.z_axis.abs() * p.z.abs() + t.abs();
+            // One rounding of the entry, one of the product, three of the sum; the rest is for this line.
+            let off = size * (4.0 * f64::EPSILON) + DVec3::splat(f64::MIN_POSITIVE);
+            let image = m * *p + t;
+            b.union(Self { min: image - off, max: image + off })
+        })
+    }
+
+    /// A box around this one's image under `map`; everything, if this one is not finite.
+    #[must_use]
+    pub fn image(self, map: &DAffine3) -> Self {
+        if self.is_empty() {
+            return Self::EMPTY;
+        }
+        if !self.is_finite() {
+            return Self::EVERYTHING;
+        }
+        let corner = |i: usize| {
+            let pick = |axis: usize| if i >> axis & 1 == 0 { self.min[axis] } else { self.max[axis] };
+            DVec3::new(pick(0), pick(1), pick(2))
+        };
+        let corners: [DVec3; 8] = std::array::from_fn(corner);
+        let image = Self::around_images(&corners, map);
+        if image.min.is_nan() || image.max.is_nan() { Self::EVERYTHING } else { image }
     }
 
     /// The smallest box around both.

@@ -1,5 +1,6 @@
 //! truehit
 mod aabb;
+mod affine;
 mod camera;
 mod error;
 mod hit;
@@ -15,6 +16,7 @@ pub mod signature;
 mod surface;
 
 pub use aabb::Aabb;
+pub use affine::Affine;
 pub use camera::{Camera, InvalidCamera};
 pub use error::InvalidShape;
 pub use glam;

@@ -1,7 +1,7 @@
 //! What a ray can meet.
 
 use crate::{Aabb, Hit, Interval, Ray};
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -26,6 +26,12 @@ pub trait Shape: Debug + Send + Sync {
 
     /// A box that holds the whole shape; infinite for an unbounded one.
     fn bounds(&self) -> Aabb;
+
+    /// A box that holds the image of the whole shape under `map`, whose entries may each be off by half a unit in the last
+    /// place. The default is the image of [`bounds`](Self::bounds); a shape that knows its vertices has a tighter one.
+    fn bounds_under(&self, map: &DAffine3) -> Aabb {
+        self.bounds().image(map)
+    }
 
     /// Whether anything is hit inside `within`: the same answer as `intersect(…).is_some()`, often sooner.
     fn occludes(&self, ray: &Ray, within: Interval) -> bool {
@@ -70,6 +76,13 @@ pub trait Shape: Debug + Send + Sync {
         0.0
     }
 
+    /// How far off the vector [`normal`](Self::normal) may be, λ's own error aside. The default, a few units in the last
+    /// place, is what the shapes of this crate keep; [`Affine`](crate::Affine) asks.
+    fn normal_error(&self, ray: &Ray, hit: &Hit) -> f64 {
+        let _ = (ray, hit);
+        8.0 * f64::EPSILON
+    }
+
     /// λ of `hit` to about a hundred bits, as an unevaluated sum of two floats: what [`Scene`](crate::Scene) compares
     /// when two objects' hits lie within their bounds of each other. The default knows no more than the hit.
     fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {
@@ -100,6 +113,9 @@ macro_rules! forward_shape {
             fn bounds(&self) -> Aabb {
                 (**self).bounds()
             }
+            fn bounds_under(&self, map: &DAffine3) -> Aabb {
+                (**self).bounds_under(map)
+            }
             fn occludes(&self, ray: &Ray, within: Interval) -> bool {
                 (**self).occludes(ray, within)
             }
@@ -117,6 +133,9 @@ macro_rules! forward_shape {
             }
             fn curvature(&self, ray: &Ray, hit: &Hit) -> f64 {
                 (**self).curvature(ray, hit)
+            }
+            fn normal_error(&self, ray: &Ray, hit: &Hit) -> f64 {
+                (**self).normal_error(ray, hit)
             }
             fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {
                 (**self).precise_lambda(ray, hit)

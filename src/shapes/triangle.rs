@@ -1,6 +1,6 @@
 use crate::kernel::triangle;
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use std::cmp::Ordering;
 
 /// A triangle, edges and vertices included.
@@ -60,6 +60,10 @@ impl Shape for Triangle {
 
     fn bounds(&self) -> Aabb {
         Aabb::around(&self.vertices)
+    }
+
+    fn bounds_under(&self, map: &DAffine3) -> Aabb {
+        Aabb::around_images(&self.vertices, map)
     }
 
     fn point(&self, _: &Ray, hit: &Hit) -> SurfacePoint {
