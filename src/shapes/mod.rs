@@ -4,6 +4,7 @@ mod cone;
 mod cylinder;
 mod frustum;
 mod local;
+mod mesh;
 mod patch;
 mod plane;
 mod sphere;
@@ -11,6 +12,7 @@ mod triangle;
 
 pub use cone::Cone;
 pub use cylinder::Cylinder;
+pub use mesh::Mesh;
 pub use patch::Patch;
 pub use plane::Plane;
 pub use sphere::Sphere;

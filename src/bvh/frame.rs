@@ -1,0 +1,144 @@
+//! The tree's own frame, in which every coordinate is at most 1: what f32 resolves well, wherever the scene is.
+
+use crate::Aabb;
+use crate::kernel::scaled::ldexp;
+use glam::DVec3;
+
+/// x ↦ (x − `center`)·2^−`exponent`.
+///
+/// A scene far from the origin is moved to it, one of any size is scaled by a power of two; f32 boxes lose neither
+/// offset nor range. The subtraction rounds once, the scaling not at all.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame {
+    pub(crate) center: DVec3,
+    pub(crate) exponent: i32,
+    pub(crate) scale: f64,
+    /// 1/`scale`; infinite where that is no float.
+    pub(crate) unscale: f64,
+}
+
+impl Frame {
+    /// The frame in which the finite box `bounds` lies inside [−1, 1]³.
+    pub(crate) fn around(bounds: Aabb) -> Self {
+        if bounds.is_empty() || !bounds.is_finite() {
+            return Self { center: DVec3::ZERO, exponent: 0, scale: 1.0, unscale: 1.0 };
+        }
+        let middle = bounds.center();
+        let half = (0.5 * bounds.max - 0.5 * bounds.min).max_element();
+        // Near the origin the frame is centred on it, so that vertices that f32 holds exactly stay exact; elsewhere
+        // on a coarse grid, for the same reason.
+        let grid = ldexp(1.0, exponent_of(half.max(1e-290)));
+        let coordinate = |m: f64| {
+            let far = m.abs() > 8.0 * half;
+            let steps = m / grid;
+            if !far {
+                0.0
+            } else if steps.abs() < 4e15 {
+                steps.round() * grid
+            } else {
+                m
+            }
+        };
+        let center = DVec3::new(coordinate(middle.x), coordinate(middle.y), coordinate(middle.z));
+        let reach = (bounds.max - center).abs().max((bounds.min - center).abs()).max_element();
+        // One rounding of `reach` cannot lift it to the next power but one.
+        let exponent = (exponent_of(reach.max(1e-290)) + 1).min(1024);
+        Self { center, exponent, scale: ldexp(1.0, -exponent), unscale: ldexp(1.0, exponent) }
+    }
+
+    /// `x` in the frame; each coordinate is off by at most u of itself and 2⁻¹⁰⁷⁴.
+    #[inline(always)]
+    pub(crate) fn local(&self, x: DVec3) -> DVec3 {
+        (x - self.center) * self.scale
+    }
+
+    /// a − b in the frame: one rounding a coordinate, and underflow.
+    #[inline(always)]
+    pub(crate) fn local_difference(&self, a: DVec3, b: DVec3) -> DVec3 {
+        (a - b) * self.scale
+    }
+
+    /// The f32 box around the box `b`: infinite if `b` is not finite, or not a box.
+    pub(crate) fn outward(&self, b: &Aabb) -> ([f32; 3], [f32; 3]) {
+        if b.is_empty() || !b.is_finite() {
+            return ([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
+        }
+        let (lo, hi) = (self.local(b.min), self.local(b.max));
+        // The subtraction's rounding; exact about the origin.
+        let slack = |v: f64, c: f64| if c == 0.0 { 0.0 } else { v.abs() * f64::EPSILON };
+        let mut out = ([0.0; 3], [0.0; 3]);
+        for i in 0..3 {
+            out.0[i] = down(lo[i] - slack(lo[i], self.center[i]));
+            out.1[i] = up(hi[i] + slack(hi[i], self.center[i]));
+        }
+        out
+    }
+}
+
+/// The exponent e with 2^e ≤ |x| < 2^(e+1); x is finite and not zero.
+#[inline]
+pub(crate) fn exponent_of(x: f64) -> i32 {
+    let field = ((x.to_bits() >> 52) & 0x7ff) as i32;
+    if field == 0 { (((x * 2f64.powi(100)).to_bits() >> 52) & 0x7ff) as i32 - 1123 } else { field - 1023 }
+}
+
+/// The largest f32 that is not above `x`; −∞ for NaN.
+#[inline(always)]
+pub(crate) fn down(x: f64) -> f32 {
+    let f = x as f32;
+    if f64::from(f) <= x {
+        f
+    } else if x.is_nan() {
+        f32::NEG_INFINITY
+    } else {
+        f.next_down()
+    }
+}
+
+/// The smallest f32 that is not below `x`; ∞ for NaN.
+#[inline(always)]
+pub(crate) fn up(x: f64) -> f32 {
+    -down(-x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn boxes_only_grow(
+            at in prop::array::uniform3(-1.0..1.0f64), size in prop::array::uniform3(0.0..1.0f64),
+            offset in -300..300i32, scale in -300..300i32,
+        ) {
+            use crate::kernel::{dyadic::Dyadic, number::Number};
+            let min = DVec3::from(at) * 2f64.powi(offset);
+            let b = Aabb::new(min, min + DVec3::from(size) * 2f64.powi(scale));
+            let frame = Frame::around(b);
+            let (lo, hi) = frame.outward(&b);
+            for i in 0..3 {
+                let exact = |x: f64| Dyadic::difference(x, frame.center[i]).shifted(-frame.exponent);
+                let below = exact(b.min[i]).minus(&f64::from(lo[i]).into());
+                let above = Dyadic::exactly(f64::from(hi[i])).minus(&exact(b.max[i]));
+                prop_assert!(below.sign() != Some(std::cmp::Ordering::Less));
+                prop_assert!(above.sign() != Some(std::cmp::Ordering::Less));
+                prop_assert!(lo[i] >= -1.0 && hi[i] <= 1.0, "{} {}", lo[i], hi[i]);
+            }
+        }
+    }
+
+    #[test]
+    fn extremes_are_legal() {
+        for b in [
+            Aabb::new([-1e308; 3], [1.7e308; 3]),
+            Aabb::new([0.0; 3], [0.0; 3]),
+            Aabb::new([1e300; 3], [1e300; 3]),
+            Aabb::new([5e-324; 3], [1e-323; 3]),
+        ] {
+            let frame = Frame::around(b);
+            let (lo, hi) = frame.outward(&b);
+            assert!((0..3).all(|i| -1.0 <= lo[i] && lo[i] <= hi[i] && hi[i] <= 1.0), "{b:?} {lo:?} {hi:?}");
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! A tree of boxes that knows no shapes: objects are numbers with a box each, leaves call closures.
+//!
+//! `build` makes a binary tree by the surface area heuristic, `collapse` packs it into nodes of eight f32 boxes,
+//! `traverse` walks it front to back with one ray. Boxes are rounded outward into the frame of `frame`, and the ray's
+//! constants in `slab` carry margins for every rounding between the f64 ray and the f32 boxes: no box that holds a
+//! point of the ray is skipped (docs/numerics.md §10).
+
+mod build;
+mod collapse;
+mod frame;
+mod level;
+mod slab;
+mod traverse;
+mod wide;
+
+pub use level::Level;
+
+pub(crate) use build::build;
+pub(crate) use frame::Frame;
+pub(crate) use slab::LocalRay;
+pub(crate) use traverse::{Any, Closest, any, closest};
+pub(crate) use wide::Wide;
+
+use crate::{Aabb, Interval, Ray};
+use fearless_simd::Simd;
+
+/// A tree over the boxes of objects numbered from zero.
+#[derive(Clone, Debug)]
+pub struct Bvh {
+    tree: Wide,
+    /// The objects in the order of the leaves.
+    objects: Vec<u32>,
+    /// Leaf i holds `objects[starts[i]..starts[i + 1]]`.
+    starts: Vec<u32>,
+    level: Level,
+}
+
+/// Objects in a leaf: one, since an object's own test costs far more than a box's.
+const OBJECTS_PER_LEAF: usize = 1;
+
+impl Bvh {
+    /// The tree over `boxes`; object i is `boxes[i]`. Empty boxes hold no object; one that is infinite or NaN is
+    /// visited by every ray.
+    ///
+    /// The same boxes give the same tree at any number of threads.
+    ///
+    /// # Panics
+    /// On 2³¹ boxes or more.
+    #[must_use]
+    pub fn build(boxes: &[Aabb]) -> Self {
+        let built = build(boxes.len(), &|i| boxes[i], OBJECTS_PER_LEAF);
+        let tree = Wide::collapse(&built);
+        Self { tree, objects: built.order(), starts: built.leaf_starts(), level: Level::detect() }
+    }
+
+    /// Calls `visit(object, bound)` for every object whose box the ray meets between `within.min` and the bound,
+    /// nearest boxes first. The bound is `within.max` at first and then what `visit` last returned: an upper bound of
+    /// the λ that still matters. An object is visited at most once.
+    #[inline]
+    pub fn closest(&self, ray: &Ray, within: Interval, visit: impl FnMut(u32, f64) -> f64) {
+        if within.is_empty() || !ray.is_valid() {
+            return;
+        }
+        let bound = within.max;
+        match LocalRay::new(&self.tree.frame, ray, within) {
+            Some(local) => {
+                closest(self.level, &self.tree, &local, &mut Nearest { bvh: self, local: &local, bound, visit })
+            }
+            // No place in the frame: every object.
+            None => drop(self.objects.iter().fold((bound, visit), |(b, mut visit), &o| (visit(o, b), visit))),
+        }
+    }
+
+    /// Whether `hits(object)` for any object whose box the ray meets inside `within`; asks until the first yes.
+    #[inline]
+    pub fn any(&self, ray: &Ray, within: Interval, mut hits: impl FnMut(u32) -> bool) -> bool {
+        if within.is_empty() || !ray.is_valid() {
+            return false;
+        }
+        match LocalRay::new(&self.tree.frame, ray, within) {
+            Some(local) => any(self.level, &self.tree, &local, &mut First { bvh: self, hits }),
+            None => self.objects.iter().any(|&o| hits(o)),
+        }
+    }
+
+    /// Uses the instructions of `level` from now on, if this CPU has them: for tests and benchmarks. All levels give
+    /// the same answers.
+    pub fn set_level(&mut self, level: Level) {
+        self.level = level;
+    }
+
+    /// Bytes on the heap.
+    #[must_use]
+    pub fn memory(&self) -> usize {
+        self.tree.memory() + size_of::<u32>() * (self.objects.capacity() + self.starts.capacity())
+    }
+
+    #[inline]
+    fn leaf(&self, leaf: u32) -> &[u32] {
+        let leaf = leaf as usize;
+        &self.objects[self.starts[leaf] as usize..self.starts[leaf + 1] as usize]
+    }
+}
+
+struct Nearest<'a, F> {
+    bvh: &'a Bvh,
+    local: &'a LocalRay,
+    bound: f64,
+    visit: F,
+}
+
+impl<F: FnMut(u32, f64) -> f64> Closest for Nearest<'_, F> {
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, _: S, leaf: u32) -> f32 {
+        for &object in self.bvh.leaf(leaf) {
+            self.bound = (self.visit)(object, self.bound);
+        }
+        self.local.upper(self.bound)
+    }
+}
+
+struct First<'a, F> {
+    bvh: &'a Bvh,
+    hits: F,
+}
+
+impl<F: FnMut(u32) -> bool> Any for First<'_, F> {
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, _: S, leaf: u32) -> bool {
+        self.bvh.leaf(leaf).iter().any(|&object| (self.hits)(object))
+    }
+}

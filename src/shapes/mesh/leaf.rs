@@ -1,0 +1,223 @@
+//! Eight triangles in f32, and the filter that no triangle met by the ray fails.
+//!
+//! The arrangement is Möller and Trumbore's (1997) with d × (v₀ − o) shared, in the frame of the tree. Each quantity is
+//! compared with a bound on its own error, so that a triangle is dropped only where the exact answer is a miss:
+//! docs/numerics.md §10.
+
+use super::Mesh;
+use crate::Aabb;
+use crate::bvh::{self, Frame, LocalRay, Wide};
+use fearless_simd::{Simd, f32x8, prelude::*};
+use glam::DVec3;
+
+/// Triangles have 29 bits for their number.
+pub(super) const MOST_TRIANGLES: usize = 1 << 29;
+const NUMBER: u32 = (1 << 29) - 1;
+/// Vertices in f32 and the frame are the mesh's own, exactly.
+const EXACT: u32 = 1 << 31;
+const ROTATION: u32 = 29;
+
+/// Up to eight triangles, with v₀ opposite the longest edge.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Leaf {
+    v0: [[f32; 8]; 3],
+    e1: [[f32; 8]; 3],
+    e2: [[f32; 8]; 3],
+    /// Not below |e₁| + |e₂|; −1 in a lane that holds no triangle.
+    size: [f32; 8],
+    /// The triangle's number, by how many places its vertices are rotated, and [`EXACT`].
+    id: [u32; 8],
+}
+
+impl Leaf {
+    const EMPTY: Self = Self { v0: [[0.0; 8]; 3], e1: [[0.0; 8]; 3], e2: [[0.0; 8]; 3], size: [-1.0; 8], id: [0; 8] };
+
+    /// Puts triangle `number` into a lane.
+    fn set(&mut self, lane: usize, frame: &Frame, vertices: &[DVec3; 3], number: u32) {
+        let lengths = [0, 1, 2].map(|i| {
+            let e = frame.local_difference(vertices[(i + 2) % 3], vertices[(i + 1) % 3]);
+            e.length_squared()
+        });
+        let rotation = (0..3).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
+        let [a, b, c] = [0, 1, 2].map(|i| vertices[(i + rotation) % 3]);
+        let (v0, e1, e2) = (frame.local(a), frame.local_difference(b, a), frame.local_difference(c, a));
+        for i in 0..3 {
+            self.v0[i][lane] = v0[i] as f32;
+            self.e1[i][lane] = e1[i] as f32;
+            self.e2[i][lane] = e2[i] as f32;
+        }
+        // Two square roots and a sum in f64, then up: 2⁻²⁰ is far more than they lose.
+        self.size[lane] = ((e1.length() + e2.length()) * (1.0 + 1e-6)) as f32;
+        self.id[lane] = number | (rotation as u32) << ROTATION | EXACT;
+        if self.rebuilt(lane, frame) != *vertices {
+            self.id[lane] &= !EXACT;
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn number(&self, lane: usize) -> u32 {
+        self.id[lane] & NUMBER
+    }
+
+    /// The vertices from the f32 copy, in the mesh's order.
+    #[inline(always)]
+    fn rebuilt(&self, lane: usize, frame: &Frame) -> [DVec3; 3] {
+        let v0 = column(&self.v0, lane);
+        let (v1, v2) = (v0 + column(&self.e1, lane), v0 + column(&self.e2, lane));
+        let a = v0 * frame.unscale + frame.center;
+        let b = v1 * frame.unscale + frame.center;
+        let c = v2 * frame.unscale + frame.center;
+        match self.id[lane] >> ROTATION & 3 {
+            0 => [a, b, c],
+            1 => [c, a, b],
+            _ => [b, c, a],
+        }
+    }
+
+    /// The vertices, without a look at the mesh's own arrays where the copy is exact.
+    #[inline(always)]
+    pub(super) fn vertices(&self, lane: usize, mesh: &Mesh) -> [DVec3; 3] {
+        if self.id[lane] & EXACT != 0 { self.rebuilt(lane, mesh.frame()) } else { mesh.vertices(self.number(lane)) }
+    }
+}
+
+/// The tree over the triangles, its leaves, and the box around all.
+pub(super) fn build(positions: &[DVec3], triangles: &[[u32; 3]]) -> (Wide, Vec<Leaf>, Aabb) {
+    let corners = |i: usize| triangles[i].map(|v| positions[v as usize]);
+    let bounds = |i: usize| {
+        let t = &triangles[i];
+        // A triangle of two points is never hit.
+        if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
+            return Aabb::EMPTY;
+        }
+        Aabb::around(&corners(i))
+    };
+    let whole = triangles.iter().flatten().fold(Aabb::EMPTY, |b, &v| {
+        let p = positions[v as usize];
+        b.union(Aabb { min: p, max: p })
+    });
+    let binary = bvh::build(triangles.len(), &bounds, 8);
+    let tree = Wide::collapse(&binary);
+    let starts = binary.leaf_starts();
+    let leaves = starts
+        .windows(2)
+        .map(|range| {
+            let mut leaf = Leaf::EMPTY;
+            for (lane, item) in binary.items[range[0] as usize..range[1] as usize].iter().enumerate() {
+                leaf.set(lane, &tree.frame, &corners(item.index as usize), item.index);
+            }
+            leaf
+        })
+        .collect();
+    (tree, leaves, whole)
+}
+
+/// The ray as the filter wants it: in f32, with the margins' constants.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Probe {
+    origin: [f32; 3],
+    direction: [f32; 3],
+    /// Margin of the edge functions: size·(`edge` + size·`edge2`).
+    edge: f32,
+    edge2: f32,
+    /// Margin of t's numerator against its denominator: size²·`depth`.
+    depth: f32,
+    pub(super) t_min: f32,
+    /// No hit has a t above this in absolute value.
+    reach: f32,
+}
+
+/// What underflow may add to any of the filter's sums.
+const UNDERFLOW: f32 = 1e-36;
+
+impl Probe {
+    #[inline(always)]
+    pub(super) fn new(ray: &LocalRay) -> Self {
+        const E: f64 = 1.0 / 16_777_216.0; // 2⁻²⁴
+        let size = ray.origin.abs().max_element();
+        let d = ray.direction.length();
+        // |v₀ − o| and, as if it were part of it, the origin's own error.
+        let r = ray.origin.length() + 1.733 + ray.origin_error / E;
+        let reach = (1.0 + size) * (1.0 + 1e-6) + ray.origin_error;
+        let up = 1.0 + 1e-6;
+        Self {
+            origin: ray.origin.as_vec3().to_array(),
+            direction: ray.direction.as_vec3().to_array(),
+            edge: (13.0 * E * d * r * up) as f32,
+            edge2: (3.0 * E * d * up) as f32,
+            depth: (3.0 * E * (r + reach * d) * up) as f32,
+            t_min: ray.t_min.max(-(reach as f32) * 1.000_001),
+            reach: reach as f32 * 1.000_001,
+        }
+    }
+
+    /// The later end of what matters: `t_max`, but no farther than any triangle.
+    #[inline(always)]
+    fn last(&self, t_max: f32) -> f32 {
+        if t_max < self.reach { t_max } else { self.reach }
+    }
+
+    /// The lanes of `leaf` whose triangles may be met between `t_min` and `t_max`.
+    #[inline(always)]
+    pub(super) fn test<S: Simd>(&self, simd: S, leaf: &Leaf, t_max: f32) -> u32 {
+        let (v0, e1, e2) = (load(simd, &leaf.v0), load(simd, &leaf.e1), load(simd, &leaf.e2));
+        let (o, d) = (spread(simd, &self.origin), spread(simd, &self.direction));
+        let size: f32x8<S> = leaf.size.simd_into(simd);
+
+        let c = [v0[0] - o[0], v0[1] - o[1], v0[2] - o[2]];
+        let r = cross(c, d);
+        let n = cross(e1, e2);
+        let det = dot(n, d);
+        let u = dot(r, e2);
+        let v = -dot(r, e1);
+        let w = det - u - v;
+        let margin =
+            size.mul_add(size.mul_add(splat(simd, self.edge2), splat(simd, self.edge)), splat(simd, UNDERFLOW));
+        // Certainly a miss: one edge function above zero, another below. An empty lane has a negative margin.
+        let least = u.min(v.min(w));
+        let most = u.max(v.max(w));
+        let outside = least.simd_lt(-margin) & most.simd_gt(margin);
+
+        // The sign of det goes to t's numerator; where it is uncertain the margin is wide enough for both.
+        let t = dot(n, c);
+        let depth = (size * size).mul_add(splat(simd, self.depth), splat(simd, UNDERFLOW));
+        let size_of_det = det.max(-det);
+        let signed = t * splat(simd, 1.0).copysign(det);
+        let beyond = (signed - size_of_det * splat(simd, self.last(t_max))).simd_gt(depth);
+        let before = (signed - size_of_det * splat(simd, self.t_min)).simd_lt(-depth);
+        !((outside | beyond | before).to_bitmask() as u32) & 0xff
+    }
+}
+
+type Vec8<S> = [f32x8<S>; 3];
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, x: f32) -> f32x8<S> {
+    f32x8::splat(simd, x)
+}
+
+#[inline(always)]
+fn spread<S: Simd>(simd: S, v: &[f32; 3]) -> Vec8<S> {
+    [splat(simd, v[0]), splat(simd, v[1]), splat(simd, v[2])]
+}
+
+#[inline(always)]
+fn load<S: Simd>(simd: S, rows: &[[f32; 8]; 3]) -> Vec8<S> {
+    [rows[0].simd_into(simd), rows[1].simd_into(simd), rows[2].simd_into(simd)]
+}
+
+#[inline(always)]
+fn dot<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> f32x8<S> {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
+}
+
+#[inline(always)]
+fn cross<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
+    [a[1].mul_sub(b[2], a[2] * b[1]), a[2].mul_sub(b[0], a[0] * b[2]), a[0].mul_sub(b[1], a[1] * b[0])]
+}
+
+#[inline(always)]
+fn column(rows: &[[f32; 8]; 3], lane: usize) -> DVec3 {
+    DVec3::new(f64::from(rows[0][lane]), f64::from(rows[1][lane]), f64::from(rows[2][lane]))
+}

@@ -1,0 +1,192 @@
+//! Triangle meshes.
+//!
+//! A tree of f32 boxes over leaves of eight f32 triangles finds the few that may be met (`leaf` says why none is
+//! lost); [`kernel::triangle`] decides them exactly and gives λ.
+
+mod attributes;
+mod leaf;
+mod query;
+
+use crate::bvh::{Frame, Level, Wide};
+use crate::kernel::triangle;
+use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
+use glam::{DVec2, DVec3};
+use leaf::Leaf;
+
+/// A mesh of triangles: closed sets, each with its edges and vertices, so that neighbours leave no gap.
+///
+/// A hit's `part` is the triangle's index and its `uv` the second and third barycentric weights; of triangles met at
+/// exactly the same λ (a shared edge, coincident triangles) the lowest index is hit. Degenerate triangles are legal
+/// and never hit. The geometric normal is by winding: (b − a) × (c − a).
+///
+/// ```
+/// use truehit::{Interval, Mesh, Ray, Shape, glam::DVec3};
+/// let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+/// let square = Mesh::new(corners.map(DVec3::from).to_vec(), vec![[0, 1, 2], [0, 2, 3]])?;
+/// // Exactly through the diagonal, which belongs to both triangles.
+/// let hit = square.intersect(&Ray::new([0.5, 0.5, 3.0], [0.0, 0.0, -1.0]), Interval::FORWARD).unwrap();
+/// assert_eq!((hit.lambda, hit.part), (3.0, 0));
+/// # Ok::<(), truehit::InvalidShape>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    positions: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+    normals: Vec<DVec3>,
+    uvs: Vec<DVec2>,
+    bounds: Aabb,
+    tree: Wide,
+    leaves: Vec<Leaf>,
+    level: Level,
+}
+
+impl Mesh {
+    /// The mesh of `triangles`, each three indices into `positions`. Both may be empty.
+    ///
+    /// # Errors
+    /// If a position is not finite, an index names no position, or there are 2²⁹ triangles or more.
+    pub fn new(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, InvalidShape> {
+        if !positions.iter().all(|p| p.is_finite()) {
+            return Err(InvalidShape::NotFinite { field: "positions" });
+        }
+        if triangles.len() >= leaf::MOST_TRIANGLES {
+            return Err(InvalidShape::TooMany { field: "triangles", given: triangles.len() });
+        }
+        let count = positions.len();
+        for (at, t) in triangles.iter().enumerate() {
+            if let Some(&index) = t.iter().find(|&&i| i as usize >= count) {
+                return Err(InvalidShape::IndexOutOfRange { field: "triangles", at, index, count });
+            }
+        }
+        let (tree, leaves, bounds) = leaf::build(&positions, &triangles);
+        let level = Level::detect();
+        Ok(Self { positions, triangles, normals: Vec::new(), uvs: Vec::new(), bounds, tree, leaves, level })
+    }
+
+    /// With a shading normal for each position, of any length; they are interpolated over the triangles, and where
+    /// they cancel the geometric normal stands in.
+    ///
+    /// # Errors
+    /// If there is not one for each position, or one is not finite.
+    pub fn with_normals(mut self, normals: Vec<DVec3>) -> Result<Self, InvalidShape> {
+        if normals.len() != self.positions.len() {
+            let (needed, given) = (self.positions.len(), normals.len());
+            return Err(InvalidShape::LengthMismatch { field: "normals", needed, given });
+        }
+        if !normals.iter().all(|n| n.is_finite()) {
+            return Err(InvalidShape::NotFinite { field: "normals" });
+        }
+        self.normals = normals;
+        Ok(self)
+    }
+
+    /// With texture coordinates for each position, interpolated over the triangles.
+    ///
+    /// # Errors
+    /// If there is not one pair for each position, or one is not finite.
+    pub fn with_uvs(mut self, uvs: Vec<DVec2>) -> Result<Self, InvalidShape> {
+        if uvs.len() != self.positions.len() {
+            let (needed, given) = (self.positions.len(), uvs.len());
+            return Err(InvalidShape::LengthMismatch { field: "uvs", needed, given });
+        }
+        if !uvs.iter().all(|uv| uv.is_finite()) {
+            return Err(InvalidShape::NotFinite { field: "uvs" });
+        }
+        self.uvs = uvs;
+        Ok(self)
+    }
+
+    /// The positions.
+    #[must_use]
+    pub fn positions(&self) -> &[DVec3] {
+        &self.positions
+    }
+
+    /// The triangles' indices into the positions.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The vertices of a triangle.
+    ///
+    /// # Panics
+    /// If there is no triangle of that index.
+    #[must_use]
+    #[inline]
+    pub fn vertices(&self, part: u32) -> [DVec3; 3] {
+        self.triangles[part as usize].map(|i| self.positions[i as usize])
+    }
+
+    /// Uses the instructions of `level` from now on, if this CPU has them: for tests and benchmarks. All levels give
+    /// the same answers.
+    pub fn set_level(&mut self, level: Level) {
+        self.level = level;
+    }
+
+    /// Bytes on the heap, all arrays included.
+    #[must_use]
+    pub fn memory(&self) -> usize {
+        self.positions.capacity() * size_of::<DVec3>()
+            + self.triangles.capacity() * size_of::<[u32; 3]>()
+            + self.normals.capacity() * size_of::<DVec3>()
+            + self.uvs.capacity() * size_of::<DVec2>()
+            + self.leaves.capacity() * size_of::<Leaf>()
+            + self.tree.memory()
+    }
+
+    fn frame(&self) -> &Frame {
+        &self.tree.frame
+    }
+}
+
+impl Shape for Mesh {
+    fn intersect(&self, ray: &Ray, within: Interval) -> Option<Hit> {
+        query::closest(self, ray, within)
+    }
+
+    fn normal(&self, _: &Ray, hit: &Hit) -> DVec3 {
+        attributes::face_normal(&self.vertices(hit.part))
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    fn occludes(&self, ray: &Ray, within: Interval) -> bool {
+        query::any(self, ray, within)
+    }
+
+    fn shading_normal(&self, ray: &Ray, hit: &Hit) -> DVec3 {
+        if self.normals.is_empty() {
+            return self.normal(ray, hit);
+        }
+        let corners = self.triangles[hit.part as usize].map(|i| self.normals[i as usize]);
+        attributes::blended_normal(&corners, hit.uv).unwrap_or_else(|| self.normal(ray, hit))
+    }
+
+    fn texture_coordinates(&self, _: &Ray, hit: &Hit) -> DVec2 {
+        if self.uvs.is_empty() {
+            return hit.uv;
+        }
+        let [a, b, c] = self.triangles[hit.part as usize].map(|i| self.uvs[i as usize]);
+        let [wa, wb, wc] = attributes::weights(hit.uv);
+        wa * a + wb * b + wc * c
+    }
+
+    fn point(&self, _: &Ray, hit: &Hit) -> SurfacePoint {
+        attributes::point(&self.vertices(hit.part), hit.uv)
+    }
+
+    fn departs(&self, ray: &Ray, hit: &Hit, outward: bool) -> bool {
+        let vertices = self.vertices(hit.part);
+        let side = if outward { std::cmp::Ordering::Greater } else { std::cmp::Ordering::Less };
+        ray.is_valid()
+            && triangle::side(&vertices, ray.origin) == side
+            && triangle::intersect(ray, &vertices, Interval::FORWARD).is_none()
+    }
+
+    fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {
+        triangle::precise_lambda(ray, &self.vertices(hit.part))
+    }
+}

@@ -1,0 +1,277 @@
+//! A mesh answers what a loop over its triangles answers, to the bit, and nothing slips through.
+
+mod meshes;
+
+use glam::DVec3;
+use meshes::{Parts, Random, grid_cube, icosphere, moved, soup, torus};
+use std::cmp::Ordering;
+use truehit::bvh::Level;
+use truehit::kernel::triangle;
+use truehit::{Hit, Interval, Mesh, Ray, Shape, glam};
+
+/// The definition: every triangle, the nearest exactly, the lowest of equals.
+fn brute_force(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
+    let mut best: Option<Hit> = None;
+    for part in 0..mesh.triangles().len() as u32 {
+        let vertices = mesh.vertices(part);
+        if let Some(hit) = triangle::intersect(ray, &vertices, within) {
+            let hit = Hit { part, ..hit };
+            let first =
+                best.is_none_or(|b| triangle::compare(ray, &vertices, &mesh.vertices(b.part)) == Ordering::Less);
+            if first {
+                best = Some(hit);
+            }
+        }
+    }
+    best
+}
+
+fn levels() -> impl Iterator<Item = Level> {
+    Level::ALL.into_iter().filter(|l| l.is_supported())
+}
+
+/// A ray at something of the mesh, from somewhere around it: (ray, interval).
+fn aimed(mesh: &Mesh, random: &mut Random) -> (Ray, Interval) {
+    let [a, b, c] = mesh.vertices(random.below(mesh.triangles().len()) as u32);
+    let target = match random.below(5) {
+        0 => a,
+        1 => 0.5 * (a + b),
+        2 => a + random.unit() * (c - a),
+        3 => 0.25 * a + 0.5 * b + 0.25 * c,
+        _ => a + random.in_cube() * (b - a).length(),
+    };
+    let (middle, size) = (mesh.bounds().center(), mesh.bounds().size().length());
+    let origin = match random.below(6) {
+        0 => middle + 0.5 * size * random.in_cube(),
+        1 => middle + size * random.in_cube(),
+        2 => middle + 1e3 * size * random.in_cube(),
+        3 => middle + 1e7 * size * random.in_cube(),
+        4 => b, // on the surface
+        _ => target + size * DVec3::AXES[random.below(3)],
+    };
+    let mut direction = target - origin;
+    match random.below(8) {
+        0 => direction *= 2f64.powi(random.below(600) as i32 - 300),
+        1 => direction = direction.normalize_or(DVec3::X),
+        2 => direction = DVec3::AXES[random.below(3)],
+        _ => {}
+    }
+    let within = match random.below(6) {
+        0 => Interval::LINE,
+        1 => Interval::new(-1.0, 2.0),
+        2 => Interval::new(0.0, 1.0),
+        3 => Interval::new(0.5, 1.0 + random.unit()),
+        _ => Interval::FORWARD,
+    };
+    (Ray::new(origin, direction), within)
+}
+
+/// (rays, hits) compared on every level.
+fn compare(name: &str, (positions, triangles): Parts, rays: usize, random: &mut Random) -> (usize, usize) {
+    let mut mesh = Mesh::new(positions, triangles).unwrap();
+    let mut hits = 0;
+    for _ in 0..rays {
+        let (ray, within) = aimed(&mesh, random);
+        let expected = brute_force(&mesh, &ray, within);
+        hits += usize::from(expected.is_some());
+        for level in levels() {
+            mesh.set_level(level);
+            let hit = mesh.intersect(&ray, within);
+            assert_eq!(hit, expected, "{name} {level:?} {ray:?} {within:?}");
+            assert_eq!(mesh.occludes(&ray, within), expected.is_some(), "{name} {level:?} {ray:?} {within:?}");
+        }
+    }
+    (rays, hits)
+}
+
+#[test]
+fn answers_are_those_of_a_loop() {
+    let mut random = Random(1);
+    let (mut rays, mut hits) = (0, 0);
+    let mut run = |name: &str, parts: Parts, n: usize| {
+        let (r, h) = compare(name, parts, n, &mut random);
+        rays += r;
+        hits += h;
+    };
+    let mut seed = Random(2);
+    for n in [1, 2, 7, 8, 9, 60, 600] {
+        for size in [1e-3, 0.1, 1.0] {
+            run("soup", soup(&mut seed, n, size), 400);
+        }
+    }
+    for exponent in [-300, -140, -40, 40, 140, 250] {
+        let parts = moved(soup(&mut seed, 100, 0.3), 2f64.powi(exponent), DVec3::ZERO);
+        run("scaled soup", parts, 400);
+    }
+    for offset in [64.0, 1e4, 1e6, 1e12] {
+        let offset = offset * seed.in_cube();
+        run("far soup", moved(soup(&mut seed, 100, 0.3), 1.0, offset), 400);
+        run("far sphere", moved(icosphere(2), 1.0, offset), 400);
+    }
+    run("sphere", icosphere(3), 1000);
+    run("torus", torus(20), 1000);
+    run("grid", grid_cube(5), 2000);
+    println!("{rays} rays, {hits} hits, {} levels, 0 differences", levels().count());
+    assert!(hits > rays / 4, "{hits} of {rays}");
+}
+
+#[test]
+fn degenerate_meshes_answer_too() {
+    let mut random = Random(3);
+    let ray = Ray::new([0.1, 0.2, 5.0], [0.0, 0.0, -1.0]);
+    // Empty.
+    let empty = Mesh::new(vec![], vec![]).unwrap();
+    assert_eq!(empty.intersect(&ray, Interval::LINE), None);
+    assert!(!empty.occludes(&ray, Interval::LINE) && empty.bounds().is_empty());
+    // All kinds of flatness, among sound triangles.
+    let mut parts = soup(&mut random, 50, 0.5);
+    let p = parts.0.clone();
+    for i in 0..50u32 {
+        let (a, b) = (p[random.below(150)], p[random.below(150)]);
+        let at = parts.0.len() as u32;
+        parts.0.extend([a, b, 0.5 * (a + b), a]);
+        parts.1.extend([[at, at + 1, at + 2], [at, at, at + 1], [at, at, at], [at, at + 1, at + 3], [i, i, at]]);
+    }
+    compare("flat", parts, 3000, &mut random);
+    // Needles.
+    let mut parts = soup(&mut random, 300, 0.5);
+    for t in parts.0.chunks_exact_mut(3) {
+        t[2] = t[0] + 1e-9 * (t[2] - t[0]);
+    }
+    let (rays, hits) = compare("needles", parts, 3000, &mut random);
+    println!("needles: {hits} of {rays} rays hit");
+    assert!(hits > 500);
+    // One flat box of aspect 1e9 in each axis.
+    for stretch in [DVec3::new(1e9, 1.0, 1.0), DVec3::new(1.0, 1.0, 1e-9), DVec3::new(1.0, 0.0, 1.0)] {
+        let mut parts = soup(&mut random, 200, 0.5);
+        parts.0.iter_mut().for_each(|p| *p *= stretch);
+        compare("stretched", parts, 1000, &mut random);
+    }
+    // Coincident triangles, in any order: the lowest index.
+    let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
+    let stack = Mesh::new(corners, [[0, 1, 2], [2, 0, 1], [1, 2, 0], [0, 2, 1]].repeat(5000)).unwrap();
+    let hit = stack.intersect(&Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]), Interval::FORWARD).unwrap();
+    assert_eq!((hit.part, hit.lambda), (0, 1.0));
+}
+
+#[test]
+fn identical_centroids_and_deep_trees_end() {
+    // 1e5 triangles around one centre, and a series in which each is a tenth of the one before.
+    let mut random = Random(4);
+    let mut parts = (vec![], vec![]);
+    for i in 0..100_000u32 {
+        let (u, v) = (random.in_cube(), random.in_cube());
+        parts.0.extend([u, v, -(u + v)]);
+        parts.1.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let mesh = Mesh::new(parts.0, parts.1).unwrap();
+    let mut hits = 0;
+    for _ in 0..20 {
+        let ray = Ray::new(3.0 * random.direction(), random.in_cube());
+        let expected = brute_force(&mesh, &ray, Interval::LINE);
+        hits += usize::from(expected.is_some());
+        assert_eq!(mesh.intersect(&ray, Interval::LINE), expected);
+    }
+    let mut parts = (vec![], vec![]);
+    for i in 0..1000u32 {
+        let s = 2f64.powi(-(i as i32));
+        parts.0.extend([DVec3::new(s, 0.0, 0.0), DVec3::new(0.0, s, 0.0), DVec3::new(0.0, 0.0, s)]);
+        parts.1.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let mesh = Mesh::new(parts.0, parts.1).unwrap();
+    for i in 0..200 {
+        let scale = 2f64.powi(-(random.below(1000) as i32));
+        let origin = scale * DVec3::new(random.unit(), random.unit(), random.unit());
+        let ray = Ray::new(origin, DVec3::splat(if i % 2 == 0 { 1.0 } else { -1.0 }));
+        let expected = brute_force(&mesh, &ray, Interval::FORWARD);
+        hits += usize::from(expected.is_some());
+        assert_eq!(mesh.intersect(&ray, Interval::FORWARD), expected);
+    }
+    println!("{hits} hits");
+    assert!(hits > 100);
+}
+
+/// Rays from inside a closed mesh at its vertices, edges and faces: all must hit. (rays, leaks)
+fn leaks(parts: &Parts, inside: DVec3, rays: usize, random: &mut Random) -> (usize, usize) {
+    let mesh = Mesh::new(parts.0.clone(), parts.1.clone()).unwrap();
+    let mut leaks = 0;
+    for i in 0..rays {
+        let [a, b, c] = mesh.vertices(random.below(mesh.triangles().len()) as u32);
+        let target = match i % 6 {
+            0 => a,
+            1 => 0.5 * (a + b),
+            2 => b + random.unit() * (c - b),
+            3 => 0.5 * (a + 0.5 * (b + c)),
+            4 => 0.5 * (c + a),
+            _ => inside + random.direction(),
+        };
+        let mut direction = target - inside;
+        if i % 4 == 3 {
+            direction = direction.normalize();
+        }
+        let ray = Ray::new(inside, direction);
+        let closest = mesh.intersect(&ray, Interval::FORWARD);
+        leaks += usize::from(closest.is_none() || !mesh.occludes(&ray, Interval::FORWARD));
+    }
+    (rays, leaks)
+}
+
+fn watertight(rays_each: usize) {
+    let mut random = Random(5);
+    let (mut rays, mut leaked) = (0, 0);
+    let spheres = [
+        (icosphere(5), DVec3::ZERO),
+        (torus(96), DVec3::X),
+        (moved(grid_cube(32), 1.0 / 16.0, DVec3::splat(-1.0)), DVec3::ZERO),
+    ];
+    for (parts, inside) in &spheres {
+        for distance in [0.0, 1.0, 64.0, 1e3, 1e4, 1e6] {
+            let offset = distance * DVec3::new(1.0, -0.7, 0.3);
+            let moved = moved(parts.clone(), 1.0, offset);
+            let inside = *inside + offset + 0.01 * random.in_cube();
+            let (r, l) = leaks(&moved, inside, rays_each, &mut random);
+            rays += r;
+            leaked += l;
+        }
+    }
+    println!("{rays} aimed rays, {leaked} leaks");
+    assert_eq!(leaked, 0);
+}
+
+#[test]
+fn closed_meshes_are_watertight() {
+    watertight(60_000);
+}
+
+#[test]
+#[ignore = "a billion rays take an hour: cargo test --release --test mesh billion -- --ignored --nocapture"]
+fn a_billion_rays_do_not_leak() {
+    watertight(1_000_000_000 / 18 + 1);
+}
+
+/// An axis-parallel grid of rays down on an integer grid mesh: every ray meets a vertex or an edge.
+#[test]
+fn grids_of_rays_meet_grids_of_triangles() {
+    let n = 24;
+    let (positions, triangles) = grid_cube(n);
+    let mesh = Mesh::new(positions, triangles).unwrap();
+    let mut rays = 0;
+    for i in 0..=2 * n {
+        for j in 0..=2 * n {
+            for axis in 0..3 {
+                let at = DVec3::from([f64::from(i) / 2.0, f64::from(j) / 2.0, -3.0]);
+                let turned = |v: DVec3| DVec3::from([v[axis], v[(axis + 1) % 3], v[(axis + 2) % 3]]);
+                let ray = Ray::new(turned(at), turned(DVec3::Z));
+                let hit = mesh.intersect(&ray, Interval::FORWARD);
+                assert_eq!(hit.map(|h| (h.lambda, h.error < 1e-14)), Some((3.0, true)), "{ray:?}");
+                assert!(mesh.occludes(&ray, Interval::FORWARD));
+                // From inside: the far face only.
+                let hit = mesh.intersect(&ray, Interval::new(3.0, f64::INFINITY)).unwrap();
+                let on_a_wall = [i, j].iter().any(|&k| k == 0 || k == 2 * n);
+                assert!(on_a_wall || hit.lambda == 3.0 + f64::from(n), "{ray:?} {hit:?}");
+                rays += 1;
+            }
+        }
+    }
+    println!("{rays} rays through vertices, edges and faces: all hit");
+}
