@@ -1,5 +1,6 @@
 //! Many shapes, one question: what does the ray meet first?
 
+use crate::bvh::Bvh;
 use crate::kernel::eft::two_diff;
 use crate::{Aabb, Hit, Interval, Ray, Shape, Surface};
 
@@ -24,8 +25,9 @@ use crate::{Aabb, Hit, Interval, Ray, Shape, Surface};
 #[derive(Debug)]
 pub struct Scene<M> {
     objects: Vec<Object<M>>,
-    /// Objects with a finite box.
+    /// Objects with a finite box; the tree's objects are places in this list.
     bounded: Vec<usize>,
+    tree: Bvh,
     /// The others, asked by every ray: planes, and shapes whose box has an infinity or a NaN in it.
     unbounded: Vec<usize>,
     bounds: Aabb,
@@ -81,7 +83,8 @@ impl<M> SceneBuilder<M> {
             let list = if own.is_finite() && !own.is_empty() { &mut bounded } else { &mut unbounded };
             list.push(index);
         }
-        Scene { objects: self.objects, bounded, unbounded, bounds }
+        let boxes: Vec<Aabb> = bounded.iter().map(|&index| self.objects[index].shape.bounds()).collect();
+        Scene { objects: self.objects, bounded, tree: Bvh::build(&boxes), unbounded, bounds }
     }
 }
 
@@ -99,16 +102,23 @@ impl<M> Scene<M> {
     #[must_use]
     pub fn intersect(&self, ray: &Ray, within: Interval) -> Option<SceneHit> {
         let mut nearest = None;
-        for &object in self.unbounded.iter().chain(&self.bounded) {
+        for &object in &self.unbounded {
             self.consider(ray, within, object, &mut nearest);
         }
+        let limit = |nearest: &Option<SceneHit>| nearest.as_ref().map_or(within.max, |n| reach(&n.hit, within.max));
+        self.tree.closest(ray, Interval { max: limit(&nearest), ..within }, |object, _| {
+            self.consider(ray, within, self.bounded[object as usize], &mut nearest);
+            limit(&nearest)
+        });
         nearest
     }
 
     /// Whether any object is hit inside `within`.
     #[must_use]
     pub fn occludes(&self, ray: &Ray, within: Interval) -> bool {
-        self.unbounded.iter().chain(&self.bounded).any(|&object| self.objects[object].shape.occludes(ray, within))
+        let occludes = |object: usize| self.objects[object].shape.occludes(ray, within);
+        self.unbounded.iter().any(|&object| occludes(object))
+            || self.tree.any(ray, within, |object| occludes(self.bounded[object as usize]))
     }
 
     /// The surface at `hit`, which [`intersect`](Self::intersect) answered for the same `ray`.

@@ -168,11 +168,11 @@ fn split(items: &mut [Item], bounds: &Box3, depth: u32, leaf: usize) -> Option<(
         centers.grow(&m, &m);
     }
     let mut scale = [0.0f32; 3];
-    for axis in 0..3 {
+    for (axis, scale) in scale.iter_mut().enumerate() {
         let extent = centers.max[axis] - centers.min[axis];
         // Just below BINS, so that the largest centre falls into the last bin. Subnormal extents divide to infinity.
         let s = BINS as f32 * (1.0 - 1e-6) / extent;
-        scale[axis] = if extent > 0.0 && s.is_finite() { s } else { 0.0 };
+        *scale = if extent > 0.0 && s.is_finite() { s } else { 0.0 };
     }
     if scale == [0.0; 3] || depth >= DEEPEST_SAH {
         return if n <= leaf { None } else { halve(items) };

@@ -7,7 +7,6 @@ impl Wide {
     /// Packs `binary`; reorders its items so that leaf i's come before leaf i + 1's, and its nodes' `first` with them.
     pub(crate) fn collapse(binary: &Binary) -> Self {
         let mut nodes = vec![WideNode::EMPTY];
-        let mut leaves = 0;
         if !binary.nodes.is_empty() {
             // (binary node, wide node to fill)
             let mut work = vec![(0u32, 0u32)];
@@ -38,15 +37,15 @@ impl Wide {
                 }
                 nodes[to as usize] = wide;
             }
-            leaves = number_leaves(&mut nodes, binary.items.len());
+            number_leaves(&mut nodes, binary.items.len());
         }
         nodes.shrink_to_fit();
-        Self { frame: binary.frame, nodes, leaves }
+        Self { frame: binary.frame, nodes }
     }
 }
 
 /// Leaves are known by their first item so far; the items' order, which is depth-first, gives them their numbers.
-fn number_leaves(nodes: &mut [WideNode], items: usize) -> u32 {
+fn number_leaves(nodes: &mut [WideNode], items: usize) {
     let is_leaf = |c: u32| c != NONE && c & LEAF != 0;
     let mut number = vec![0u32; items];
     for n in &*nodes {
@@ -65,7 +64,6 @@ fn number_leaves(nodes: &mut [WideNode], items: usize) -> u32 {
             *c = LEAF | number[(*c & !LEAF) as usize];
         }
     }
-    count
 }
 
 /// The up to eight descendants of `from` that become one node's children; a leaf is its own.

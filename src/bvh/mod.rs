@@ -57,17 +57,18 @@ impl Bvh {
     /// nearest boxes first. The bound is `within.max` at first and then what `visit` last returned: an upper bound of
     /// the λ that still matters. An object is visited at most once.
     #[inline]
-    pub fn closest(&self, ray: &Ray, within: Interval, visit: impl FnMut(u32, f64) -> f64) {
+    pub fn closest(&self, ray: &Ray, within: Interval, mut visit: impl FnMut(u32, f64) -> f64) {
         if within.is_empty() || !ray.is_valid() {
             return;
         }
-        let bound = within.max;
-        match LocalRay::new(&self.tree.frame, ray, within) {
-            Some(local) => {
-                closest(self.level, &self.tree, &local, &mut Nearest { bvh: self, local: &local, bound, visit })
-            }
+        let mut bound = within.max;
+        if let Some(local) = LocalRay::new(&self.tree.frame, ray, within) {
+            closest(self.level, &self.tree, &local, &mut Nearest { bvh: self, local: &local, bound, visit });
+        } else {
             // No place in the frame: every object.
-            None => drop(self.objects.iter().fold((bound, visit), |(b, mut visit), &o| (visit(o, b), visit))),
+            for &object in &self.objects {
+                bound = visit(object, bound);
+            }
         }
     }
 

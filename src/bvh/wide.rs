@@ -36,9 +36,8 @@ impl WideNode {
 #[derive(Clone, Debug)]
 pub(crate) struct Wide {
     pub(crate) frame: Frame,
-    pub(crate) nodes: Vec<WideNode>,
     /// Leaves are numbered from zero in depth-first order.
-    pub(crate) leaves: u32,
+    pub(crate) nodes: Vec<WideNode>,
 }
 
 impl Wide {

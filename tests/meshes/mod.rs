@@ -1,5 +1,5 @@
 //! Meshes and random numbers for the tests of trees and meshes.
-#![allow(dead_code, reason = "each test uses some")]
+#![allow(dead_code, unreachable_pub, reason = "each test uses some")]
 
 use glam::DVec3;
 use std::collections::HashMap;

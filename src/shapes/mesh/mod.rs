@@ -10,7 +10,7 @@ mod query;
 use crate::bvh::{Frame, Level, Wide};
 use crate::kernel::triangle;
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 use leaf::Leaf;
 
 /// A mesh of triangles: closed sets, each with its edges and vertices, so that neighbours leave no gap.
@@ -146,11 +146,15 @@ impl Shape for Mesh {
     }
 
     fn normal(&self, _: &Ray, hit: &Hit) -> DVec3 {
-        attributes::face_normal(&self.vertices(hit.part))
+        triangle::normal(&self.vertices(hit.part))
     }
 
     fn bounds(&self) -> Aabb {
         self.bounds
+    }
+
+    fn bounds_under(&self, map: &DAffine3) -> Aabb {
+        Aabb::around_images(&self.positions, map)
     }
 
     fn occludes(&self, ray: &Ray, within: Interval) -> bool {
@@ -175,7 +179,8 @@ impl Shape for Mesh {
     }
 
     fn point(&self, _: &Ray, hit: &Hit) -> SurfacePoint {
-        attributes::point(&self.vertices(hit.part), hit.uv)
+        let (position, error) = triangle::point(&self.vertices(hit.part), hit.uv);
+        SurfacePoint { position, error }
     }
 
     fn departs(&self, ray: &Ray, hit: &Hit, outward: bool) -> bool {

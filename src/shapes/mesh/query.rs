@@ -43,7 +43,7 @@ fn closest_of_all(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
     (0..mesh.triangles.len() as u32).fold(None, |best, part| {
         let hit = triangle::intersect(ray, &mesh.vertices(part), within);
         match hit {
-            Some(hit) => nearer(mesh, ray, best, Hit { part, ..hit }),
+            Some(hit) => Some(nearer(mesh, ray, best, Hit { part, ..hit })),
             None => best,
         }
     })
@@ -51,8 +51,8 @@ fn closest_of_all(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
 
 /// Whichever of two hits comes first: exactly, and by number where λ is the same.
 #[inline(always)]
-fn nearer(mesh: &Mesh, ray: &Ray, best: Option<Hit>, hit: Hit) -> Option<Hit> {
-    let Some(old) = best else { return Some(hit) };
+fn nearer(mesh: &Mesh, ray: &Ray, best: Option<Hit>, hit: Hit) -> Hit {
+    let Some(old) = best else { return hit };
     let (gap, slack) = (hit.lambda - old.lambda, hit.error + old.error);
     // Rounding the two sums cannot make an overlap look like a gap of twice its size.
     let order = if gap > 2.0 * slack {
@@ -62,7 +62,7 @@ fn nearer(mesh: &Mesh, ray: &Ray, best: Option<Hit>, hit: Hit) -> Option<Hit> {
     } else {
         triangle::compare(ray, &mesh.vertices(hit.part), &mesh.vertices(old.part)).then(hit.part.cmp(&old.part))
     };
-    Some(if order == Ordering::Less { hit } else { old })
+    if order == Ordering::Less { hit } else { old }
 }
 
 /// The exact test with the products of the instruction level at hand.
@@ -98,7 +98,7 @@ impl Nearest<'_> {
             let vertices = leaf.vertices(lane, self.mesh);
             if let Some(hit) = confirm(simd, self.ray, &vertices, self.within) {
                 let hit = Hit { part: leaf.number(lane), ..hit };
-                self.best = nearer(self.mesh, self.ray, self.best, hit);
+                self.best = Some(nearer(self.mesh, self.ray, self.best, hit));
             }
         }
         if let Some(best) = self.best {
