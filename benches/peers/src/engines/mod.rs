@@ -3,6 +3,7 @@
 mod bvh;
 mod obvhs;
 mod parry;
+mod truehit;
 
 use crate::embree::{Embree, Mode, Scene};
 use crate::engine::{Engine, Maker};
@@ -28,6 +29,7 @@ pub fn all(embree: Option<&Arc<Embree>>) -> Vec<Maker> {
     let mut add = |name, double, make: fn(&Mesh) -> Box<dyn Engine>| {
         makers.push(Maker { name, double, make: Box::new(make) });
     };
+    add("truehit", true, |mesh| Box::new(truehit::Single::new(mesh)));
     add("obvhs CWBVH", false, |mesh| Box::new(obvhs::Cw::new(mesh)));
     add("obvhs BVH2", false, |mesh| Box::new(obvhs::Binary::new(mesh)));
     add("parry3d", false, |mesh| Box::new(parry::Single::new(mesh)));
