@@ -27,5 +27,5 @@ pub use raster::Raster;
 pub use ray::Ray;
 pub use scene::{Scene, SceneBuilder, SceneHit};
 pub use shape::{Shape, SurfacePoint};
-pub use shapes::{Cone, Cylinder, Mesh, Patch, Plane, Sphere, Triangle};
+pub use shapes::{Cone, Cylinder, Mesh, Patch, Plane, Polygon, Sphere, Triangle};
 pub use surface::Surface;

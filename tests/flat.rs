@@ -8,9 +8,10 @@ use std::fmt::Debug;
 use support::cases::{Case, Kernel, Solid};
 use support::families;
 use support::sweep::{Row, quantile, sweep};
+use truehit::glam::DVec2;
 use truehit::glam::DVec3;
-use truehit::kernel::{eft, plane, triangle};
-use truehit::{Affine, Hit, Interval, Plane, Ray, Shape, Triangle};
+use truehit::kernel::{eft, plane, polygon, slab, triangle};
+use truehit::{Affine, Cone, Hit, Interval, Plane, Polygon, Ray, Shape, Sphere, Triangle};
 
 /// m·2^e, exactly: dashu's integers, nothing of truehit's.
 #[derive(Clone, Debug)]
@@ -462,6 +463,29 @@ fn planes_in_every_family() {
 }
 
 #[test]
+fn polygons_in_every_family() {
+    families_of(Kernel::Polygon, 3000, |case| {
+        let Solid::Polygon(contours) = &case.solid else { unreachable!() };
+        let contours: Vec<&[DVec3]> = contours.iter().map(Vec::as_slice).collect();
+        let shape = Polygon::with_holes(contours[0], &contours[1..]).unwrap();
+        let contours = polygon::Contours::new(&contours).unwrap();
+        let hit = polygon::intersect(&case.ray, &contours, case.within);
+        assert_eq!(hit, polygon::intersect_with::<eft::Split>(&case.ray, &contours, case.within));
+        assert_eq!(hit, shape.intersect(&case.ray, case.within));
+        hit
+    });
+}
+
+#[test]
+fn boxes_in_every_family() {
+    families_of(Kernel::Slab, 5000, |case| {
+        let Solid::Slab { min, max } = case.solid else { unreachable!() };
+        let (enter, _) = slab::intersect(&case.ray, min, max, case.within)?;
+        Some(Hit { lambda: enter, error: f64::INFINITY, uv: DVec2::ZERO, part: 0 })
+    });
+}
+
+#[test]
 fn triangles_in_every_family() {
     families_of(Kernel::Triangle, 2000, |case| {
         let Solid::Triangle(t) = &case.solid else { unreachable!() };
@@ -491,6 +515,14 @@ fn show(kernel: Kernel, number: u32, name: &str, row: &Row) {
 fn shape(solid: &Solid) -> Option<Box<dyn Shape>> {
     Some(match solid {
         Solid::Plane { point, normal } => Box::new(Plane::new(*point, *normal).unwrap()),
+        Solid::Polygon(contours) => {
+            let holes: Vec<&[DVec3]> = contours[1..].iter().map(Vec::as_slice).collect();
+            Box::new(Polygon::with_holes(&contours[0], &holes).unwrap())
+        }
+        Solid::Sphere { center, radius } => Box::new(Sphere::new(*center, *radius).unwrap()),
+        Solid::Frustum { base, top, base_radius, top_radius } => {
+            Box::new(Cone::truncated(*base, *top, *base_radius, *top_radius).unwrap())
+        }
         Solid::Triangle([a, b, c]) => Box::new(Triangle::new(*a, *b, *c).unwrap()),
         _ => return None,
     })

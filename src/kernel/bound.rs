@@ -25,6 +25,9 @@ pub const TRIANGLE_SIDES: f64 = 50.0 * U;
 /// the products' absolute values and κ = P_D/|D|.
 pub const PLANE_QUOTIENT: f64 = 160.0 * U * U;
 
+/// Polygon, docs/numerics.md §7: a vertex as the ray sees it, sₓd_z − s_zdₓ, is off by at most 6.1u·|s|∞|d|∞.
+pub const POLYGON_COORDINATE: f64 = 7.0 * U;
+
 /// Where splitting a factor could overflow; fast paths stay below, so that both kinds of
 /// [`Product`](super::eft::Product) give the same bits.
 pub const LARGE: f64 = f64::from_bits((1023 + 900) << 52);

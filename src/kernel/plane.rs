@@ -67,10 +67,10 @@ pub(super) fn quotient<P: Product>(ray: &Ray, point: DVec3, [n, n_lo]: [DVec3; 2
 
     let kappa = den_size * inverse.abs();
     let vanished = UNDERFLOW * inverse.abs();
-    let beyond_rounding =
-        PLANE_QUOTIENT * (kappa * (num_size * inverse.abs() + q.abs() * kappa)) + vanished * (1.0 + q.abs());
-    let error = (U * lambda.abs() + beyond_rounding) * (1.0 + 8.0 * U);
     let sizes = n.abs().element_sum() + d.abs().element_sum() + s.abs().element_sum();
+    let beyond_rounding = PLANE_QUOTIENT * (kappa * (num_size * inverse.abs() + q.abs() * kappa))
+        + vanished * (1.0 + q.abs()) * (1.0 + sizes);
+    let error = (U * lambda.abs() + beyond_rounding) * (1.0 + 8.0 * U);
     // A NaN anywhere makes one of these false.
     let usable = (kappa < 1.0 / (64.0 * U))
         & (vanished < 1.0)

@@ -7,6 +7,7 @@ mod local;
 mod mesh;
 mod patch;
 mod plane;
+mod polygon;
 mod sphere;
 mod triangle;
 
@@ -15,5 +16,6 @@ pub use cylinder::Cylinder;
 pub use mesh::Mesh;
 pub use patch::Patch;
 pub use plane::Plane;
+pub use polygon::Polygon;
 pub use sphere::Sphere;
 pub use triangle::Triangle;
