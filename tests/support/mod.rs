@@ -11,4 +11,5 @@ pub mod families;
 pub mod measure;
 pub mod oracle;
 pub mod rng;
+pub mod shapes;
 pub mod sweep;
