@@ -93,12 +93,13 @@ fn normals_are_unit_vectors_and_outward() {
         if let Some(exact) = flat_normal(&case.solid) {
             prop_assert!((n - exact).abs().max_element() < 1e-15, "{} {n} for {exact}", family.name);
         }
-        if let Solid::Sphere { center, radius } = &case.solid {
-            if (1e-100..1e100).contains(radius) && case.ray.origin.length() < 1e10 * radius {
-                let out = (shape.point(&case.ray, &hit).position - *center) / *radius;
-                let size = center.length() / radius + 1.0;
-                prop_assert!((n - out).length() < 1e-14 * size, "{} {n} for {out}", family.name);
-            }
+        if let Solid::Sphere { center, radius } = &case.solid
+            && (1e-100..1e100).contains(radius)
+            && case.ray.origin.length() < 1e10 * radius
+        {
+            let out = (shape.point(&case.ray, &hit).position - *center) / *radius;
+            let size = center.length() / radius + 1.0;
+            prop_assert!((n - out).length() < 1e-14 * size, "{} {n} for {out}", family.name);
         }
         Ok(true)
     });
@@ -116,7 +117,7 @@ fn is_ordinary(case: &Case) -> bool {
         }
         _ => return false,
     }
-    all.iter().flat_map(|v| v.to_array()).all(|x| x == 0.0 || (1e-50..1e50).contains(&x.abs()))
+    all.iter().flat_map(DVec3::to_array).all(|x| x == 0.0 || (1e-50..1e50).contains(&x.abs()))
 }
 
 #[test]
@@ -153,14 +154,15 @@ fn a_reversed_direction_mirrors() {
         let within = Interval::new(-case.within.max, -case.within.min);
         let (hit, other) = (shape.intersect(&case.ray, case.within), shape.intersect(&back, within));
         prop_assert_eq!(hit.is_some(), other.is_some(), "{}", family.name);
-        let (Some(hit), Some(mut other)) = (hit, other) else { return Ok(false) };
-        if solid(&case.solid) && other.lambda != -hit.lambda {
-            // The other end comes first: the one after it, or the same one if there is none.
+        let (Some(hit), Some(other)) = (hit, other) else { return Ok(false) };
+        let off = |other: &Hit| (hit.lambda + other.lambda).abs() - (hit.error + other.error);
+        let mut least = off(&other);
+        if solid(&case.solid) && least > 0.0 {
+            // The other end comes first: the one after it is meant, unless no float lies between them.
             let rest = Interval::new((other.lambda + other.error).next_up(), within.max);
-            other = shape.intersect(&back, rest).unwrap_or(other);
+            least = shape.intersect(&back, rest).map_or(least - 4.0 * f64::EPSILON * hit.lambda.abs(), |h| off(&h));
         }
-        let off = (hit.lambda + other.lambda).abs();
-        prop_assert!(off <= hit.error + other.error, "{} {} {}", family.name, hit.lambda, other.lambda);
+        prop_assert!(least <= 0.0, "{} {} {}", family.name, hit.lambda, other.lambda);
         Ok(true)
     });
 }
@@ -263,7 +265,6 @@ fn everything(shape: impl Shape) -> String {
 fn pointers_forward_every_method() {
     let value = everything(Probe);
     assert_eq!(everything(&Probe), value);
-    assert_eq!(everything(&&Probe), value);
     assert_eq!(everything(Box::new(Probe)), value);
     assert_eq!(everything(Arc::new(Probe)), value);
     assert_eq!(everything(Box::new(Probe) as Box<dyn Shape>), value);

@@ -1,14 +1,14 @@
 //! A case's solid as one of the crate's shapes.
 
-use super::cases::Solid;
-use truehit::{Cone, Cylinder, InvalidShape, Plane, Shape, Sphere, Triangle};
+use super::cases::{Case, Solid};
+use truehit::{Affine, Cone, Cylinder, InvalidShape, Plane, Shape, Sphere, Triangle};
 
 /// The shape, if there is one for this solid and its constructor takes it.
 pub fn shape(solid: &Solid) -> Option<Result<Box<dyn Shape>, InvalidShape>> {
-    fn boxed<S: Shape + 'static>(shape: Result<S, InvalidShape>) -> Option<Result<Box<dyn Shape>, InvalidShape>> {
-        Some(shape.map(|s| Box::new(s) as Box<dyn Shape>))
+    fn boxed<S: Shape + 'static>(shape: Result<S, InvalidShape>) -> Result<Box<dyn Shape>, InvalidShape> {
+        shape.map(|s| Box::new(s) as Box<dyn Shape>)
     }
-    match solid {
+    Some(match solid {
         Solid::Plane { point, normal } => boxed(Plane::new(*point, *normal)),
         Solid::Triangle([a, b, c]) => boxed(Triangle::new(*a, *b, *c)),
         Solid::Sphere { center, radius } => boxed(Sphere::new(*center, *radius)),
@@ -19,6 +19,20 @@ pub fn shape(solid: &Solid) -> Option<Result<Box<dyn Shape>, InvalidShape>> {
         Solid::Frustum { base, top, base_radius, top_radius } => {
             boxed(Cone::truncated(*base, *top, *base_radius, *top_radius))
         }
-        Solid::Polygon(_) | Solid::Slab { .. } | Solid::Mesh { .. } | Solid::Affine { .. } => None,
+        Solid::Affine { world_from_object, inner, .. } => {
+            shape(inner)?.and_then(|inner| boxed(Affine::new(inner, *world_from_object)))
+        }
+        Solid::Polygon(_) | Solid::Slab { .. } | Solid::Mesh { .. } => return None,
+    })
+}
+
+/// The case with the maps that the crate's shapes store in place of the generator's own inverses.
+pub fn as_stored(mut case: Case) -> Case {
+    let mut solid = &mut case.solid;
+    while let Solid::Affine { world_from_object, object_from_world, inner } = solid {
+        *object_from_world =
+            *Affine::new(Sphere::UNIT, *world_from_object).expect("an invertible map").object_from_world();
+        solid = inner;
     }
+    case
 }

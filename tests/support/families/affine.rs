@@ -33,6 +33,44 @@ pub const FAMILIES: &[Family] = &[
         let map = DAffine3 { translation: rng.unit() * 1e9, ..random(rng, 0.0) };
         through(rng, i, map)
     }),
+    family(1, "grazed through a map", |rng, i| {
+        let map = random(rng, 3.0);
+        let inner = if i.is_multiple_of(2) {
+            let mut sphere = super::sphere::ordinary(rng, i);
+            if let Solid::Sphere { center, radius } = sphere.solid {
+                let u = rng.unit();
+                let impact = radius * (1.0 + rng.sign() * rng.log(1e-16, 1e-4));
+                let origin = center + rng.across(u) * impact - u * 3.0 * radius;
+                sphere.ray = truehit::Ray { origin, direction: u * rng.length() };
+            }
+            sphere
+        } else {
+            let mut triangle = super::flat::ordinary_triangle(rng, i);
+            if let Solid::Triangle(v) = triangle.solid {
+                let target = v[0].lerp(v[1], rng.uniform(0.0, 1.0));
+                let u = rng.unit();
+                triangle.ray = truehit::Ray { origin: target - u * 3.0, direction: u * rng.length() };
+            }
+            triangle
+        };
+        place(inner, map)
+    }),
+    family(46, "origin on the surface", |rng, i| {
+        let map = random(rng, 3.0);
+        let mut inner = super::sphere::ordinary(rng, i);
+        if let Solid::Sphere { center, radius } = inner.solid {
+            inner.ray.origin = center + rng.unit() * radius;
+        }
+        place(inner, map)
+    }),
+    family(72, "a chain of 20", |rng, i| {
+        let mut case = super::sphere::ordinary(rng, i);
+        for _ in 0..20 {
+            let map = random(rng, 3.0);
+            case = place(case, map);
+        }
+        case
+    }),
     family(73, "uniform scale 1e±120", |rng, i| {
         let s = 10f64.powf(120.0 * rng.sign());
         let map = turned(rng, DMat3::from_diagonal(DVec3::splat(s)));
@@ -71,6 +109,11 @@ fn through(rng: &mut Rng, i: usize, world_from_object: DAffine3) -> Case {
         3 => super::flat::ordinary_triangle(rng, i),
         _ => super::flat::ordinary_plane(rng, i),
     };
+    place(inner, world_from_object)
+}
+
+/// A case taken to the world by `world_from_object`, ray and all.
+fn place(inner: Case, world_from_object: DAffine3) -> Case {
     let origin = world_from_object.transform_point3(inner.ray.origin);
     let direction = world_from_object.transform_vector3(inner.ray.direction);
     let solid = Solid::Affine {
