@@ -1,7 +1,7 @@
 //! A case's solid as one of the crate's shapes.
 
 use super::cases::{Case, Solid};
-use truehit::{Affine, Cone, Cylinder, InvalidShape, Plane, Shape, Sphere, Triangle};
+use truehit::{Affine, Cone, Cylinder, InvalidShape, Mesh, Plane, Shape, Sphere, Triangle};
 
 /// The shape, if there is one for this solid and its constructor takes it.
 pub fn shape(solid: &Solid) -> Option<Result<Box<dyn Shape>, InvalidShape>> {
@@ -22,7 +22,8 @@ pub fn shape(solid: &Solid) -> Option<Result<Box<dyn Shape>, InvalidShape>> {
         Solid::Affine { world_from_object, inner, .. } => {
             shape(inner)?.and_then(|inner| boxed(Affine::new(inner, *world_from_object)))
         }
-        Solid::Polygon(_) | Solid::Slab { .. } | Solid::Mesh { .. } => return None,
+        Solid::Mesh { positions, triangles } => boxed(Mesh::new(positions.clone(), triangles.clone())),
+        Solid::Polygon(_) | Solid::Slab { .. } => return None,
     })
 }
 

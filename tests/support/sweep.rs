@@ -238,4 +238,8 @@ pub const SHIPPED: &[Contender] = &[
         Solid::Affine { .. } => shape(&c.solid)?.expect("a legal shape").intersect(&c.ray, c.within),
         _ => None,
     }),
+    shipped("mesh", &[Kernel::Mesh], |c| match &c.solid {
+        Solid::Mesh { .. } => shape(&c.solid)?.expect("a legal mesh").intersect(&c.ray, c.within),
+        _ => None,
+    }),
 ];
