@@ -1,7 +1,8 @@
 //! A case's solid as one of the crate's shapes.
 
 use super::cases::{Case, Solid};
-use truehit::{Affine, Cone, Cylinder, InvalidShape, Mesh, Plane, Shape, Sphere, Triangle};
+use truehit::glam::DVec3;
+use truehit::{Affine, Cone, Cylinder, InvalidShape, Mesh, Plane, Polygon, Shape, Sphere, Triangle};
 
 /// The shape, if there is one for this solid and its constructor takes it.
 pub fn shape(solid: &Solid) -> Option<Result<Box<dyn Shape>, InvalidShape>> {
@@ -23,7 +24,11 @@ pub fn shape(solid: &Solid) -> Option<Result<Box<dyn Shape>, InvalidShape>> {
             shape(inner)?.and_then(|inner| boxed(Affine::new(inner, *world_from_object)))
         }
         Solid::Mesh { positions, triangles } => boxed(Mesh::new(positions.clone(), triangles.clone())),
-        Solid::Polygon(_) | Solid::Slab { .. } => return None,
+        Solid::Polygon(contours) => {
+            let holes: Vec<&[DVec3]> = contours[1..].iter().map(Vec::as_slice).collect();
+            boxed(Polygon::with_holes(&contours[0], &holes))
+        }
+        Solid::Slab { .. } => return None,
     })
 }
 

@@ -6,7 +6,7 @@ use super::oracle::{Line, Truth, ends, is_borderline, truth};
 use super::shapes::{as_stored, shape};
 use truehit::Hit;
 use truehit::glam::{DVec2, DVec3};
-use truehit::kernel::{frustum, plane, sphere, textbook, triangle};
+use truehit::kernel::{frustum, plane, polygon, slab, sphere, textbook, triangle};
 
 /// What a kernel answers to a case; `None` for shapes it does not know.
 pub type Answer = fn(&Case) -> Option<Hit>;
@@ -240,6 +240,20 @@ pub const SHIPPED: &[Contender] = &[
     }),
     shipped("mesh", &[Kernel::Mesh], |c| match &c.solid {
         Solid::Mesh { .. } => shape(&c.solid)?.expect("a legal mesh").intersect(&c.ray, c.within),
+        _ => None,
+    }),
+    shipped("polygon", &[Kernel::Polygon], |c| match &c.solid {
+        Solid::Polygon(contours) => {
+            let contours: Vec<&[DVec3]> = contours.iter().map(Vec::as_slice).collect();
+            polygon::intersect(&c.ray, &polygon::Contours::new(&contours).expect("a legal polygon"), c.within)
+        }
+        _ => None,
+    }),
+    shipped("slab", &[Kernel::Slab], |c| match &c.solid {
+        Solid::Slab { min, max } => {
+            let (enter, _) = slab::intersect(&c.ray, *min, *max, c.within)?;
+            Some(Hit { lambda: enter, error: f64::INFINITY, uv: DVec2::ZERO, part: 0 })
+        }
         _ => None,
     }),
 ];
