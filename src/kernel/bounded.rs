@@ -9,69 +9,90 @@ use super::eft::{Product, Split, quick_two_sum, two_diff, two_sum};
 use super::number::Number;
 use super::scaled::Scaled;
 use std::cmp::Ordering;
+use std::marker::PhantomData;
 
-/// The exact value lies within `error` of hi + lo.
+/// The exact value lies within `error` of hi + lo. Products are formed the way `P` says, with the same bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounded {
+pub struct Bounded<P = Split> {
     /// The leading part.
     pub hi: f64,
     /// The rest, at most half an ulp of `hi`.
     pub lo: f64,
-    /// How far off hi + lo may be; NaN or infinite where nothing is known.
+    /// How far off hi + lo may be; NaN or infinite where nothing is known, zero where nothing was rounded.
     pub error: f64,
+    by: PhantomData<P>,
 }
 
-/// Relative error of one double-double operation: the theorems give 3u² (sum) and 7u² (product).
-const OPERATION: f64 = 8.0 * U * U;
+/// Relative error of one double-double product: the theorem gives 7u².
+const PRODUCT: f64 = 8.0 * U * U;
 
-impl Bounded {
+/// A product of floats at least this large has a rounding error that is a float.
+const EXACT: f64 = f64::from_bits((1023 - 900) << 52); // 2⁻⁹⁰⁰
+
+impl<P: Product> Bounded<P> {
     /// hi + lo with a bound that is known from elsewhere; |lo| may be as large as |hi|.
     #[must_use]
+    #[inline(always)]
     pub fn new(hi: f64, lo: f64, error: f64) -> Self {
         let (hi, lo) = two_sum(hi, lo);
-        Self { hi, lo, error }
+        Self { hi, lo, error, by: PhantomData }
     }
 
     /// |self| is at most this.
+    #[inline(always)]
     fn magnitude(&self) -> f64 {
         self.hi.abs() * (1.0 + 2.0 * U)
     }
 }
 
-impl Number for Bounded {
+impl<P: Product> Number for Bounded<P> {
+    #[inline(always)]
     fn exactly(value: f64) -> Self {
-        Self { hi: value, lo: 0.0, error: 0.0 }
+        Self { hi: value, lo: 0.0, error: 0.0, by: PhantomData }
     }
 
+    #[inline(always)]
     fn difference(a: f64, b: f64) -> Self {
         let (hi, lo) = two_diff(a, b);
-        Self { hi, lo, error: 0.0 }
+        Self { hi, lo, error: 0.0, by: PhantomData }
     }
 
+    /// What is dropped is known: short numbers, and ties of them, stay exact.
+    #[inline(always)]
     fn plus(&self, other: &Self) -> Self {
         let (s_hi, s_lo) = two_sum(self.hi, other.hi);
         let (t_hi, t_lo) = two_sum(self.lo, other.lo);
-        let (v_hi, v_lo) = quick_two_sum(s_hi, s_lo + t_hi);
-        let (hi, lo) = quick_two_sum(v_hi, t_lo + v_lo);
-        let error = (self.error + other.error + OPERATION * hi.abs()) * INFLATE;
-        Self { hi, lo, error }
+        let (c, c_dropped) = two_sum(s_lo, t_hi);
+        let (v_hi, v_lo) = quick_two_sum(s_hi, c);
+        let (w, w_dropped) = two_sum(t_lo, v_lo);
+        let (hi, lo) = quick_two_sum(v_hi, w);
+        let error = ((self.error + other.error) + (c_dropped.abs() + w_dropped.abs())) * INFLATE;
+        Self { hi, lo, error, by: PhantomData }
     }
 
+    #[inline(always)]
     fn minus(&self, other: &Self) -> Self {
         self.plus(&other.negated())
     }
 
+    #[inline(always)]
     fn times(&self, other: &Self) -> Self {
-        let (c, c_lo) = Split::two_product(self.hi, other.hi);
+        let (c, c_lo) = P::two_product(self.hi, other.hi);
         let (hi, lo) = quick_two_sum(c, c_lo + (self.hi * other.lo + self.lo * other.hi));
+        // Two floats have an exact product, unless it is so small that its rounding error is no float.
+        let floats = (self.lo == 0.0) & (other.lo == 0.0) & (self.error == 0.0) & (other.error == 0.0);
+        let exact = floats & ((c.abs() > EXACT) | (self.hi == 0.0) | (other.hi == 0.0));
+        let rounded = if exact { 0.0 } else { PRODUCT * hi.abs() + UNDERFLOW };
         let carried = self.magnitude() * other.error + other.magnitude() * self.error + self.error * other.error;
-        Self { hi, lo, error: (carried + OPERATION * hi.abs()) * INFLATE + UNDERFLOW }
+        Self { hi, lo, error: (carried + rounded) * INFLATE, by: PhantomData }
     }
 
+    #[inline(always)]
     fn negated(&self) -> Self {
-        Self { hi: -self.hi, lo: -self.lo, error: self.error }
+        Self { hi: -self.hi, lo: -self.lo, ..*self }
     }
 
+    #[inline(always)]
     fn sign(&self) -> Option<Ordering> {
         // |hi + lo| ≥ |hi|(1 − 2u); a NaN or infinite bound compares false.
         if self.hi.abs() * (1.0 - 4.0 * U) > self.error {
@@ -103,7 +124,7 @@ mod tests {
 
     /// Random chains of operations, the same in both arithmetics: the exact value is always inside.
     fn check(values: &[f64], ops: &[u8]) -> (f64, bool) {
-        let mut b = Bounded::difference(values[0], values[1]);
+        let mut b = <Bounded>::difference(values[0], values[1]);
         let mut d = Dyadic::difference(values[0], values[1]);
         for (v, op) in values[2..].windows(2).zip(ops) {
             let (vb, vd) = (Bounded::difference(v[0], v[1]), Dyadic::difference(v[0], v[1]));

@@ -36,6 +36,7 @@ pub trait Number: Clone {
 
     /// self².
     #[must_use]
+    #[inline(always)]
     fn squared(&self) -> Self {
         self.times(self)
     }
@@ -45,24 +46,32 @@ pub trait Number: Clone {
 pub type Vector<N> = [N; 3];
 
 /// `v`, exactly.
+#[inline(always)]
 pub fn vector<N: Number>(v: DVec3) -> Vector<N> {
     [N::exactly(v.x), N::exactly(v.y), N::exactly(v.z)]
 }
 
 /// a − b of two float vectors.
+#[inline(always)]
 pub fn difference<N: Number>(a: DVec3, b: DVec3) -> Vector<N> {
     [N::difference(a.x, b.x), N::difference(a.y, b.y), N::difference(a.z, b.z)]
 }
 
 /// a · b.
+#[inline(always)]
 pub fn dot<N: Number>(a: &Vector<N>, b: &Vector<N>) -> N {
     a[0].times(&b[0]).plus(&a[1].times(&b[1])).plus(&a[2].times(&b[2]))
 }
 
 /// a × b.
+#[inline(always)]
 pub fn cross<N: Number>(a: &Vector<N>, b: &Vector<N>) -> Vector<N> {
-    let minor = |i: usize, j: usize| a[i].times(&b[j]).minus(&a[j].times(&b[i]));
-    [minor(1, 2), minor(2, 0), minor(0, 1)]
+    [minor(a, b, 1, 2), minor(a, b, 2, 0), minor(a, b, 0, 1)]
+}
+
+#[inline(always)]
+fn minor<N: Number>(a: &Vector<N>, b: &Vector<N>, i: usize, j: usize) -> N {
+    a[i].times(&b[j]).minus(&a[j].times(&b[i]))
 }
 
 /// v/|v|, if its components are known to more than the last place of the largest; zero for the zero vector.

@@ -137,6 +137,12 @@ impl Scaled {
         Self { hi, lo, exponent: self.exponent - other.exponent }.normalised()
     }
 
+    /// self / other as a float, to a few ulps; `other` is not zero.
+    #[must_use]
+    pub fn quotient(self, other: Self) -> f64 {
+        ldexp(self.hi / other.hi, self.exponent - other.exponent)
+    }
+
     /// √self: relative error ≤ 6u²; self is not negative.
     #[must_use]
     pub fn sqrt(self) -> Self {

@@ -8,6 +8,7 @@ use super::number::Number;
 use super::scaled::{SCALED_ERROR, Scaled};
 use crate::hit::Hit;
 use crate::interval::Interval;
+use crate::ray::Ray;
 use glam::DVec2;
 use std::cmp::Ordering;
 
@@ -16,6 +17,7 @@ use std::cmp::Ordering;
 pub(super) struct Undecided;
 
 /// `Undecided` where there is no sign.
+#[inline(always)]
 pub(super) fn sign<N: Number>(n: &N) -> Result<Ordering, Undecided> {
     n.sign().ok_or(Undecided)
 }
@@ -40,45 +42,59 @@ pub(super) enum End<'a, N> {
     Rising(&'a Quadratic<N>),
 }
 
-/// λ is good enough if it is known to a thousandth of an ulp; a NaN is not.
-fn is_sharp(relative: f64) -> bool {
-    relative <= super::bound::U / 1024.0
+/// An end's λ: exactly within `relative` of `exact`, and within `error` of `rounded`.
+#[derive(Clone, Copy, Debug)]
+struct Lambda {
+    exact: Scaled,
+    relative: f64,
+    rounded: f64,
+    error: f64,
+}
+
+impl Lambda {
+    fn new((exact, relative): (Scaled, f64)) -> Self {
+        let (rounded, rounding) = exact.to_f64();
+        let error = if rounded.is_finite() {
+            (rounding + relative * rounded.abs()) * super::bound::INFLATE
+        } else {
+            f64::INFINITY
+        };
+        Self { exact, relative, rounded, error }
+    }
+
+    /// Good enough if it is known to a thousandth of its ulp, or of an ulp of `fine`; a NaN is not.
+    fn is_sharp(&self, fine: f64) -> bool {
+        const PART: f64 = super::bound::U / 1024.0;
+        self.relative <= PART || self.relative * self.rounded.abs() <= PART * fine
+    }
 }
 
 impl<N: Number> End<'_, N> {
     /// λ and a bound on its relative error; infinite where it is not known.
-    pub(super) fn lambda(&self) -> (Scaled, f64) {
-        let ratio = |(p, p_error): (Scaled, f64), (q, q_error): (Scaled, f64)| {
-            if q.is_zero() {
-                return (Scaled::ZERO, f64::INFINITY);
-            }
-            // (1 + p)(1 + op)/(1 − q) ≤ 1 + 1.01·(p + q + op) for errors below 2⁻⁸.
-            let error = 1.01 * (p_error + q_error + SCALED_ERROR);
-            (p.over(q), if error < 1.0 / 256.0 { error } else { f64::INFINITY })
-        };
-        match self {
+    fn lambda(&self) -> Lambda {
+        Lambda::new(match self {
             Self::Plane { value, rate } => ratio(value.negated().rounded(), rate.rounded()),
-            Self::Falling(q) => q.root(true, ratio),
-            Self::Rising(q) => q.root(false, ratio),
-        }
+            Self::Falling(q) => q.root(true),
+            Self::Rising(q) => q.root(false),
+        })
     }
 
     /// λ compared with `m`.
-    fn compare(&self, m: f64) -> Result<Ordering, Undecided> {
+    fn compare(&self, lambda: &Lambda, m: f64) -> Result<Ordering, Undecided> {
         if m.is_infinite() {
-            return Ok(if m > 0.0 { Ordering::Less } else { Ordering::Greater });
+            return Ok(0f64.total_cmp(&m));
         }
-        let (lambda, relative) = self.lambda();
-        let (value, rounding) = lambda.to_f64();
-        if value.is_finite() {
-            let error = (rounding + relative * value.abs()) * 1.01;
-            if value - error > m {
-                return Ok(Ordering::Greater);
-            }
-            if value + error < m {
-                return Ok(Ordering::Less);
-            }
+        if lambda.rounded - lambda.error > m {
+            return Ok(Ordering::Greater);
         }
+        if lambda.rounded + lambda.error < m {
+            return Ok(Ordering::Less);
+        }
+        self.compare_exactly(m)
+    }
+
+    #[cold]
+    fn compare_exactly(&self, m: f64) -> Result<Ordering, Undecided> {
         let at = N::exactly(m);
         match self {
             Self::Plane { value, rate } => {
@@ -92,9 +108,19 @@ impl<N: Number> End<'_, N> {
     }
 }
 
+/// p/q and a bound on its relative error.
+fn ratio((p, p_error): (Scaled, f64), (q, q_error): (Scaled, f64)) -> (Scaled, f64) {
+    if q.is_zero() {
+        return (Scaled::ZERO, f64::INFINITY);
+    }
+    // (1 + p)(1 + op)/(1 − q) ≤ 1 + 1.01·(p + q + op) for errors below 2⁻⁸.
+    let error = 1.01 * (p_error + q_error + SCALED_ERROR);
+    (p.over(q), if error < 1.0 / 256.0 { error } else { f64::INFINITY })
+}
+
 impl<N: Number> Quadratic<N> {
     /// The root at which the polynomial falls or rises: (−b ∓ √D)/a, by the form that does not cancel. It must exist.
-    fn root(&self, falling: bool, ratio: impl Fn((Scaled, f64), (Scaled, f64)) -> (Scaled, f64)) -> (Scaled, f64) {
+    fn root(&self, falling: bool) -> (Scaled, f64) {
         let (b, b_error) = self.b.rounded();
         let (discriminant, d_error) = self.discriminant.rounded();
         // |√(1 + e) − 1| ≤ |e| for |e| ≤ 1.
@@ -102,13 +128,15 @@ impl<N: Number> Quadratic<N> {
         if discriminant.is_negative() {
             return (Scaled::ZERO, f64::INFINITY);
         }
-        let q = b.abs().plus(discriminant.sqrt());
+        let root = discriminant.sqrt();
+        let q = b.abs().plus(root);
         if q.is_zero() {
             // b = D = 0: a double root at zero.
             let known = b_error == 0.0 && d_error == 0.0;
             return (Scaled::ZERO, if known { 0.0 } else { f64::INFINITY });
         }
-        let q_error = if b_error > root_error { b_error } else { root_error } + SCALED_ERROR;
+        // Each part's error in proportion to what it adds: a grazing ray's √D is small, and badly known.
+        let q_error = b_error + 1.01 * root_error * root.quotient(q) + SCALED_ERROR;
         // Falling: −(|b| + √D)/a for b ≥ 0, c/(|b| + √D) for b < 0; rising: the same with b's and λ's sign turned.
         let (lambda, error) = if b.is_negative() == falling && !b.is_zero() {
             ratio(self.c.rounded(), (q, q_error))
@@ -138,47 +166,80 @@ impl<N: Number> Quadratic<N> {
     }
 }
 
-/// The nearest of the two ends that lies inside `within`, each with the part it is on.
-pub(super) fn nearest<N: Number>(ends: [(End<N>, u32); 2], within: Interval) -> Result<Option<Hit>, Undecided> {
-    for (end, part) in ends {
-        if end.compare(within.min)?.is_gt() {
-            return if end.compare(within.max)?.is_lt() { hit(&end, part).map(Some) } else { Ok(None) };
-        }
+/// The nearest of the two ends that lies inside `within`, each with the part it is on. An error of a thousandth of an
+/// ulp of `fine` will do.
+#[inline(always)]
+pub(super) fn nearest<N: Number>(
+    [(enter, enter_part), (exit, exit_part)]: [(End<N>, u32); 2],
+    within: Interval,
+    fine: f64,
+) -> Result<Option<Hit>, Undecided> {
+    match inside(&enter, enter_part, within, fine)? {
+        Place::Before => {}
+        Place::Inside(hit) => return Ok(Some(hit)),
+        Place::Beyond => return Ok(None),
     }
-    Ok(None)
+    match inside(&exit, exit_part, within, fine)? {
+        Place::Inside(hit) => Ok(Some(hit)),
+        Place::Before | Place::Beyond => Ok(None),
+    }
 }
 
-fn hit<N: Number>(end: &End<N>, part: u32) -> Result<Hit, Undecided> {
-    let (exact, relative) = end.lambda();
-    if !is_sharp(relative) {
+/// Where an end lies against an interval.
+enum Place {
+    Before,
+    Inside(Hit),
+    Beyond,
+}
+
+fn inside<N: Number>(end: &End<N>, part: u32, within: Interval, fine: f64) -> Result<Place, Undecided> {
+    let lambda = end.lambda();
+    if end.compare(&lambda, within.min)?.is_le() {
+        return Ok(Place::Before);
+    }
+    if end.compare(&lambda, within.max)?.is_ge() {
+        return Ok(Place::Beyond);
+    }
+    if !lambda.is_sharp(fine) {
         return Err(Undecided);
     }
-    let (lambda, rounding) = exact.to_f64();
-    if lambda.is_infinite() {
-        return Ok(Hit { lambda: f64::MAX.copysign(lambda), error: f64::INFINITY, uv: DVec2::ZERO, part });
-    }
-    let error = (rounding + relative * lambda.abs()) * super::bound::INFLATE;
-    Ok(Hit { lambda, error, uv: DVec2::ZERO, part })
+    // Beyond the largest float it is that, and nothing is promised of it.
+    let rounded = lambda.rounded.clamp(-f64::MAX, f64::MAX);
+    Ok(Place::Inside(Hit { lambda: rounded, error: lambda.error, uv: DVec2::ZERO, part }))
 }
 
-/// Of two ends the λ nearest to `lambda`, to a hundred bits; `None` where this arithmetic knows less.
+/// What is 2⁻⁴⁰ of the largest coordinate of ray and shape over |direction| at most: an ulp of it is the least that is
+/// promised of λ. Zero where that cannot be computed.
+#[inline(always)]
+pub(super) fn fine(ray: &Ray, extent: f64) -> f64 {
+    let direction = 1.75 * ray.direction.abs().max_element();
+    let fine = ray.origin.abs().max_element().max(extent) * (1.0 / (1u64 << 40) as f64) / direction;
+    if fine < f64::INFINITY { fine } else { 0.0 }
+}
+
+/// Of two ends the λ nearest to `lambda`, to a hundred bits; undecided where this arithmetic knows less.
 pub(super) fn precise<N: Number>(ends: &[End<N>; 2], lambda: f64) -> Result<[f64; 2], Undecided> {
-    let (enter, enter_error) = ends[0].lambda();
-    let (exit, exit_error) = ends[1].lambda();
-    if !is_sharp(enter_error) || !is_sharp(exit_error) {
+    let (enter, exit) = (ends[0].lambda(), ends[1].lambda());
+    if !enter.is_sharp(0.0) || !exit.is_sharp(0.0) {
         return Err(Undecided);
     }
     let at = Scaled::new(lambda, 0.0, 0);
-    let (from_enter, from_exit) = (enter.minus(at).abs(), exit.minus(at).abs());
-    let (hi, lo) = if from_exit.minus(from_enter).is_negative() { exit.to_pair() } else { enter.to_pair() };
+    let (from_enter, from_exit) = (enter.exact.minus(at).abs(), exit.exact.minus(at).abs());
+    let nearest = if from_exit.minus(from_enter).is_negative() { exit } else { enter };
+    let (hi, lo) = nearest.exact.to_pair();
     Ok([hi, lo])
 }
 
-/// `decide` in double-double, and exactly where that cannot tell.
+/// `decide` in double-double, and exactly where that cannot tell. It must be inlined whole.
 macro_rules! refined {
     ($decide:ident($($argument:expr),*)) => {
-        $decide::<$crate::kernel::bounded::Bounded>($($argument),*)
-            .or_else(|_| $decide::<$crate::kernel::dyadic::Dyadic>($($argument),*))
+        $crate::kernel::cpu::dispatch(
+            #[inline(always)]
+            || $decide::<$crate::kernel::bounded::Bounded<$crate::kernel::eft::Fused>>($($argument),*),
+            #[inline(always)]
+            || $decide::<$crate::kernel::bounded::Bounded<$crate::kernel::eft::Split>>($($argument),*),
+        )
+        .or_else(|_| $decide::<$crate::kernel::dyadic::Dyadic>($($argument),*))
     };
 }
 pub(super) use refined;

@@ -11,7 +11,7 @@ use super::bound::U;
 use super::cpu;
 use super::eft::{Fused, Product, Split, two_diff, two_sum};
 use super::number::{Number, cross, difference, dot, vector};
-use super::section::{End, Quadratic, Undecided, nearest, precise, refined, sign};
+use super::section::{End, Quadratic, Undecided, fine, nearest, precise, refined, sign};
 use crate::hit::Hit;
 use crate::interval::Interval;
 use crate::ray::Ray;
@@ -154,6 +154,7 @@ fn accepts(ray: &Ray, center: DVec3, radius: f64) -> bool {
 
 /// |f + λd|² − r² with f = origin − center. By Lagrange's identity its discriminant is |d|²r² − |f × d|², which does
 /// not cancel as b² − ac does from afar.
+#[inline(always)]
 fn quadratic<N: Number>(ray: &Ray, center: DVec3, radius: f64) -> Quadratic<N> {
     let (f, d) = (difference::<N>(ray.origin, center), vector::<N>(ray.direction));
     let r2 = N::exactly(radius).squared();
@@ -163,14 +164,17 @@ fn quadratic<N: Number>(ray: &Ray, center: DVec3, radius: f64) -> Quadratic<N> {
     Quadratic { b: dot(&f, &d), c: dot(&f, &f).minus(&r2), a, discriminant }
 }
 
+#[inline(always)]
 fn decide<N: Number>(ray: &Ray, center: DVec3, radius: f64, within: Interval) -> Result<Option<Hit>, Undecided> {
     let q = quadratic::<N>(ray, center, radius);
     if sign(&q.discriminant)?.is_lt() {
         return Ok(None);
     }
-    nearest([(End::Falling(&q), 0), (End::Rising(&q), 0)], within)
+    let fine = fine(ray, center.abs().max_element().max(radius));
+    nearest([(End::Falling(&q), 0), (End::Rising(&q), 0)], within, fine)
 }
 
+#[inline(always)]
 fn sharpen<N: Number>(ray: &Ray, center: DVec3, radius: f64, lambda: f64) -> Result<[f64; 2], Undecided> {
     let q = quadratic::<N>(ray, center, radius);
     if sign(&q.discriminant)?.is_lt() {
@@ -179,6 +183,7 @@ fn sharpen<N: Number>(ray: &Ray, center: DVec3, radius: f64, lambda: f64) -> Res
     precise(&[End::Falling(&q), End::Rising(&q)], lambda)
 }
 
+#[inline(always)]
 fn locate<N: Number>(point: DVec3, center: DVec3, radius: f64) -> Result<Ordering, Undecided> {
     let f = difference::<N>(point, center);
     sign(&dot(&f, &f).minus(&N::exactly(radius).squared()))
