@@ -187,6 +187,9 @@ impl Frustum {
     }
 
     pub(super) fn departs(&self, ray: &Ray, outward: bool) -> bool {
+        if !ray.is_valid() {
+            return false;
+        }
         let side = frustum::side(ray.origin, self.base, self.top, self.base_radius, self.top_radius);
         if outward { side.is_gt() && self.intersect(ray, Interval::FORWARD).is_none() } else { side.is_lt() }
     }

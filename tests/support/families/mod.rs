@@ -14,6 +14,11 @@ use super::rng::{Rng, nudged};
 use truehit::glam::DVec3;
 use truehit::{Interval, Ray};
 
+/// The ordinary rays of a kernel.
+pub fn ordinary(kernel: Kernel) -> Family {
+    *all().iter().find(|f| f.kernel == kernel && f.number == 0).expect("every kernel has ordinary rays")
+}
+
 /// Every family of every kernel.
 pub fn all() -> Vec<Family> {
     let mut families: Vec<Family> = [
@@ -110,7 +115,7 @@ fn ldexp(x: f64, k: i32) -> f64 {
 }
 
 /// Coordinates times 2^k, direction times 2^l.
-fn scaled(case: Case, k: i32, l: i32) -> Case {
+pub fn scaled(case: Case, k: i32, l: i32) -> Case {
     let v = |p: DVec3, k: i32| DVec3::new(ldexp(p.x, k), ldexp(p.y, k), ldexp(p.z, k));
     let ray = Ray { origin: v(case.ray.origin, k), direction: v(case.ray.direction, l) };
     Case { ray, within: case.within, solid: scaled_solid(case.solid, k) }
