@@ -4,7 +4,7 @@ mod support;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use support::cases::{Family, Kernel};
+use support::cases::{Case, Family, Kernel};
 use support::families;
 use support::sweep::{Contender, Row, SHIPPED, TEXTBOOK, quantile, sweep};
 
@@ -96,49 +96,62 @@ fn textbook_kernels_show_their_errors() {
     }
 }
 
-/// The contract of every shipped kernel: no wrong decision, no wrong part, no broken bound, λ within its ulps.
-fn check_shipped(ordinary: usize, hard: usize) {
-    header();
+/// The contract of a shipped kernel: no wrong decision, no wrong part, no broken bound, λ within its ulps.
+fn check(kernel: Kernel, ordinary: usize, hard: usize) {
+    let contender = SHIPPED.iter().find(|c| c.kernels.contains(&kernel)).expect("a shipped kernel");
     let mut broken = Vec::new();
-    for contender in SHIPPED {
-        for &kernel in contender.kernels {
-            for (family, row) in rows(contender, kernel, ordinary, hard) {
-                print(&family, &row);
-                for (what, case) in &row.failures {
-                    broken.push(format!("{} {} {}: {what}: {}", kernel.name(), family.number, family.name, case.hex()));
-                }
-                if let Some((ulps, case)) = &row.worst
-                    && (*ulps > family.contract() || ulps.is_nan())
-                {
-                    broken.push(format!(
-                        "{} {} {}: {ulps} ulp: {}",
-                        kernel.name(),
-                        family.number,
-                        family.name,
-                        case.hex()
-                    ));
-                }
-                assert_eq!(
-                    row.hits == 0,
-                    ALL_MISS.contains(&(kernel, family.number)),
-                    "{}: {} hits",
-                    family.name,
-                    row.hits
-                );
-            }
+    let mut total = Row::default();
+    header();
+    for (family, row) in rows(contender, kernel, ordinary, hard) {
+        print(&family, &row);
+        let named = |what: &str, case: &Case| {
+            format!("{} {} {}: {what}: {}", kernel.name(), family.number, family.name, case.hex())
+        };
+        broken.extend(row.failures.iter().map(|(what, case)| named(what, case)));
+        if let Some((ulps, case)) = &row.worst
+            && (*ulps > family.contract() || ulps.is_nan())
+        {
+            broken.push(named(&format!("{ulps} ulp"), case));
         }
+        let misses = ALL_MISS.contains(&(kernel, family.number));
+        assert_eq!(row.hits == 0, misses, "{}: {} hits", family.name, row.hits);
+        total.merge(Row { ulps: Vec::new(), tightness: Vec::new(), worst: None, ..row });
     }
+    println!(
+        "{}: {} cases, {} hits, {} wrong, {} wrong parts, {} bounds broken",
+        kernel.name(),
+        total.cases,
+        total.hits,
+        total.wrong(),
+        total.wrong_parts,
+        total.violations
+    );
     assert!(broken.is_empty(), "\n{}", broken.join("\n"));
 }
 
-#[test]
-fn shipped_kernels_keep_their_contract() {
-    check_shipped(50_000, 50_000);
-}
+macro_rules! contracts {
+    ($($kernel:ident $quick:ident $long:ident)*) => {$(
+        #[test]
+        fn $quick() {
+            check(Kernel::$kernel, 50_000, 50_000);
+        }
 
-/// `cargo test --release --test exact -- --ignored --nocapture`: 1e7 cases a kernel.
-#[test]
-#[ignore = "an hour or so"]
-fn shipped_kernels_keep_their_contract_ten_million_times() {
-    check_shipped(5_000_000, 5_000_000);
+        /// `cargo test --release --test exact -- --ignored --nocapture --test-threads 1`: 1e7 cases a kernel, half hard.
+        #[test]
+        #[ignore = "minutes to an hour"]
+        fn $long() {
+            check(Kernel::$kernel, 5_000_000, 5_000_000);
+        }
+    )*};
+}
+contracts! {
+    Plane plane_keeps_its_contract plane_ten_million_times
+    Triangle triangle_keeps_its_contract triangle_ten_million_times
+    Polygon polygon_keeps_its_contract polygon_ten_million_times
+    Sphere sphere_keeps_its_contract sphere_ten_million_times
+    Cylinder cylinder_keeps_its_contract cylinder_ten_million_times
+    Cone cone_keeps_its_contract cone_ten_million_times
+    Slab box_keeps_its_contract box_ten_million_times
+    Mesh mesh_keeps_its_contract mesh_ten_million_times
+    Affine affine_keeps_its_contract affine_ten_million_times
 }

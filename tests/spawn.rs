@@ -120,7 +120,8 @@ impl Tally {
         let again = body.intersect(&spawned, Interval::FORWARD);
         // A few units in the last place of the coordinates, not as far as it takes.
         let coordinates = largest(surface.point()).max(largest(ray.origin)).max(largest(object_point));
-        if !(spawned.origin.distance(surface.point()) <= 1e-12 * coordinates) {
+        let off = spawned.origin.distance(surface.point());
+        if off.is_nan() || off > 1e-12 * coordinates {
             self.skipped += 1;
             self.fail("far off", &case, map.as_ref(), direction);
         }
