@@ -93,7 +93,7 @@ fn inverse(map: &DAffine3) -> Result<DAffine3, InvalidShape> {
     }
     let over = |numerator: &Dyadic| {
         let ratio = Ratio { numerator: numerator.clone(), denominator: det.clone() };
-        match ratio.lambda() {
+        match ratio.lambda(0.0) {
             Some((value, error)) if error.is_finite() => Ok(value),
             _ => Err(InvalidShape::OutOfRange { field: FIELD, value: f64::INFINITY }),
         }

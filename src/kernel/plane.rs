@@ -76,7 +76,7 @@ pub(super) fn quotient<P: Product>(ray: &Ray, point: DVec3, [n, n_lo]: [DVec3; 2
         & (vanished < 1.0)
         & (sizes + den.abs() + q.abs() < LARGE)
         & (lambda.abs() > SMALL)
-        & (beyond_rounding < 0.5 * U * lambda.abs());
+        & ((beyond_rounding < 0.5 * U * lambda.abs()) | (beyond_rounding * largest(d) < FLOOR * largest(s)));
     if !usable {
         return Quotient::Uncertain;
     }
@@ -87,6 +87,13 @@ pub(super) fn quotient<P: Product>(ray: &Ray, point: DVec3, [n, n_lo]: [DVec3; 2
         return Quotient::Outside;
     }
     Quotient::Uncertain
+}
+
+/// λ need not be better known than to ½u·2⁻⁴⁴ of the distance to `point` over the direction's length.
+const FLOOR: f64 = 0.5 * U / (1u64 << 44) as f64;
+
+fn largest(v: DVec3) -> f64 {
+    v.abs().max_element()
 }
 
 /// a·b + low in double-double, and Σ|aᵢbᵢ|; |low| ≤ 2u·Σ|aᵢbᵢ|.
@@ -115,7 +122,8 @@ fn refine(ray: &Ray, point: DVec3, normal: DVec3, within: Interval) -> Option<Hi
     if (0..3).all(|i| normal[i] == 0.0 || ray.direction[i] == 0.0) {
         return None;
     }
-    let (lambda, error) = ratio::refine(|| ratio(ray, point, normal), || ratio(ray, point, normal), within)?;
+    let (lambda, error) =
+        ratio::refine(|| ratio(ray, point, normal), || ratio(ray, point, normal), within, ratio::floor(ray, point))?;
     Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 })
 }
 

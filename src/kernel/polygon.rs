@@ -267,6 +267,7 @@ fn refine(ray: &Ray, polygon: &Contours, within: Interval) -> Option<Hit> {
         || plane(ray, point, &polygon.bounded_normal()),
         || plane(ray, point, &polygon.exact_normal),
         within,
+        ratio::floor(ray, point),
     )?;
     Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 })
 }

@@ -2,11 +2,13 @@
 //!
 //! docs/numerics.md §3.
 
+use super::bound::U;
 use super::bounded::Bounded;
 use super::dyadic::Dyadic;
 use super::number::Number;
 use super::scaled::{SCALED_ERROR, Scaled};
-use crate::Interval;
+use crate::{Interval, Ray};
+use glam::DVec3;
 use std::cmp::Ordering;
 
 /// λ = numerator/denominator.
@@ -51,19 +53,21 @@ impl<N: Number> Ratio<N> {
         (n.over(d), 2.0 * (n_error + d_error) + SCALED_ERROR)
     }
 
-    /// λ as a float with a bound on its error, if this arithmetic gives it to the last bit or nearly.
+    /// λ as a float with a bound on its error, if this arithmetic gives it to the last bit or nearly, or is off by no
+    /// more than `tolerated`.
     #[must_use]
-    pub fn lambda(&self) -> Option<(f64, f64)> {
+    pub fn lambda(&self, tolerated: f64) -> Option<(f64, f64)> {
         let (value, relative) = self.value();
-        if relative > ENOUGH {
+        let (lambda, rounding) = value.to_f64();
+        let known = relative <= ENOUGH || relative * lambda.abs() <= tolerated;
+        if !known {
             return None;
         }
-        let (lambda, rounding) = value.to_f64();
         if lambda.is_infinite() {
             // No float is near it: the largest stands for it, and claims nothing.
             return Some((f64::MAX.copysign(lambda), f64::INFINITY));
         }
-        Some((lambda, rounding + lambda.abs() * ENOUGH))
+        Some((lambda, rounding + lambda.abs() * relative.max(ENOUGH)))
     }
 }
 
@@ -79,12 +83,14 @@ impl Ratio<Dyadic> {
 }
 
 /// λ and its error bound where the exact λ lies in `within`: from double-doubles where they will do, exactly otherwise.
-/// A miss where D is zero.
+/// A miss where D is zero. λ may be off by `tolerated`, beside its last rounding, where it is too small to be known to
+/// the last bit.
 #[cold]
 pub fn refine(
     bounded: impl FnOnce() -> Ratio<Bounded>,
     exact: impl FnOnce() -> Ratio<Dyadic>,
     within: Interval,
+    tolerated: f64,
 ) -> Option<(f64, f64)> {
     let ratio = bounded();
     if ratio.denominator.sign() == Some(Ordering::Equal) {
@@ -93,7 +99,7 @@ pub fn refine(
     match ratio.is_inside(within) {
         Some(false) => return None,
         Some(true) => {
-            if let Some(answer) = ratio.lambda() {
+            if let Some(answer) = ratio.lambda(tolerated) {
                 return Some(answer);
             }
         }
@@ -103,7 +109,7 @@ pub fn refine(
     if ratio.denominator.is_zero() || !ratio.is_inside(within)? {
         return None;
     }
-    ratio.lambda()
+    ratio.lambda(tolerated)
 }
 
 /// λ to about a hundred bits, as an unevaluated sum.
@@ -113,4 +119,13 @@ pub fn precise(bounded: impl FnOnce() -> Ratio<Bounded>, exact: impl FnOnce() ->
     let value = if relative <= ENOUGH * ENOUGH.sqrt() { value } else { exact().value().0 };
     let (hi, lo) = value.to_pair();
     [hi, lo]
+}
+
+/// Half an ulp of 2⁻⁴⁰ times a distance from the ray's origin over the direction's length, or less: what λ need not be
+/// better known than, near the origin.
+#[must_use]
+pub fn floor(ray: &Ray, point: DVec3) -> f64 {
+    let distance = (point - ray.origin).abs().max_element();
+    let floor = U * (0.125 / (1u64 << 40) as f64) * distance / ray.direction.abs().max_element();
+    if floor.is_finite() { floor } else { 0.0 }
 }

@@ -84,7 +84,7 @@ impl Crossing {
     }
 
     fn lambda(self) -> f64 {
-        self.infinity().or_else(|| Some(self.ratio::<super::dyadic::Dyadic>().lambda()?.0)).unwrap_or(f64::NAN)
+        self.infinity().or_else(|| Some(self.ratio::<super::dyadic::Dyadic>().lambda(0.0)?.0)).unwrap_or(f64::NAN)
     }
 }
 
