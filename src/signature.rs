@@ -47,8 +47,9 @@ impl Signature {
 /// The colour of `object`, as sRGB bytes: never black, and a different one for each of the first 2²⁴ − 1 objects.
 #[must_use]
 pub fn color(object: usize) -> [u8; 3] {
-    // Multiplication by an odd number permutes the numbers modulo 2²⁴ and leaves 0 where it is.
-    const SPREAD: u32 = 0x009E_3779;
+    // Multiplication by an odd number permutes the numbers modulo 2²⁴ and leaves 0 where it is. Of some ten thousand
+    // tried this one keeps black and the first 24 colours furthest apart: 96 in the RGB cube of side 255.
+    const SPREAD: u32 = 0x000A_A61F;
     let hash = (object % 0x00FF_FFFF) as u32 + 1;
     let [_, r, g, b] = (hash.wrapping_mul(SPREAD) & 0x00FF_FFFF).to_be_bytes();
     [r, g, b]

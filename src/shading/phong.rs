@@ -44,10 +44,13 @@ pub fn specular(s: DVec3, n: DVec3, c: DVec3, shininess: f64) -> f64 {
 pub fn terminator(s: DVec3, n: DVec3, facet: DVec3) -> f64 {
     let above = s.dot(facet);
     let shown = s.dot(n) * facet.dot(n);
-    if n == facet || above >= shown {
-        // Also where the interpolated normal has turned more than 90° from the facet's.
-        return if above > 0.0 { 1.0 } else { 0.0 };
+    if above <= 0.0 {
+        return 0.0;
     }
-    let g = (above / shown).max(0.0);
+    // Also where the interpolated normal has turned more than 90° from the facet's.
+    if n == facet || above >= shown {
+        return 1.0;
+    }
+    let g = above / shown;
     g + g * g - g * g * g
 }
