@@ -1,4 +1,4 @@
-//! One mesh, many places: a dahlia of five hundred petals that are all the same `Arc<Mesh>`.
+//! One mesh, many places: a dahlia of two hundred petals that are all the same `Arc<Mesh>`.
 //!
 //! `cargo run --release --example instancing`
 
@@ -22,7 +22,7 @@ use truehit::shading::{Background, Light, Material, Mirror, Rgb};
 use truehit::{Affine, InvalidShape, Mesh, Plane};
 
 const HELP: &str = "\
-Renders a flower of five hundred petals that share one mesh.
+Renders a flower of two hundred petals that share one mesh.
 
 Usage: cargo run --release --example instancing -- [OPTIONS]
 
@@ -32,7 +32,7 @@ Usage: cargo run --release --example instancing -- [OPTIONS]
   -o, --output FILE    [default: instancing.png]
   -h, --help           this text";
 
-const PETALS: u32 = 500;
+const PETALS: u32 = 200;
 
 fn main() -> ExitCode {
     args::exit_code(run())
@@ -62,9 +62,9 @@ fn stage(petal: &Arc<Mesh>) -> Result<Stage, InvalidShape> {
         let color = if out < 0.4 { heart.lerp(middle, out / 0.4) } else { middle.lerp(rim, (out - 0.4) / 0.6) };
         let material = Material::matt(color).with_gloss(0.18, 40.0);
         let place = DAffine3::from_rotation_z(golden_angle * f64::from(k))
-            * DAffine3::from_translation(DVec3::new(1.0 * out, 0.0, 0.1 + 0.42 * (1.0 - out * out)))
-            * DAffine3::from_rotation_y(-1.35 + 1.1 * out)
-            * DAffine3::from_scale(DVec3::splat(0.34 + 0.5 * out));
+            * DAffine3::from_translation(DVec3::new(0.8 * out, 0.0, 0.08 + 0.3 * (1.0 - out * out)))
+            * DAffine3::from_rotation_y(-1.4 + 1.25 * out)
+            * DAffine3::from_scale(DVec3::splat(0.5 + 0.62 * out));
         props.put("petal", Affine::new(Arc::clone(petal), place)?, &material);
     }
     let (scene, names) = props.finish();
@@ -91,7 +91,7 @@ fn petal() -> Result<Mesh, InvalidShape> {
     const ALONG: u32 = 24;
     const ACROSS: u32 = 16;
     let surface = |s: f64, t: f64| {
-        let width = 0.34 * (std::f64::consts::PI * s.powf(0.8)).sin().max(0.0).sqrt() * (1.0 - 0.25 * s);
+        let width = 0.3 * (std::f64::consts::PI * s.powf(1.1)).sin().max(0.0).powf(0.7);
         DVec3::new(s, width * t, 0.22 * s * s + 0.5 * width * t * t)
     };
     let (mut positions, mut normals) = (Vec::new(), Vec::new());

@@ -14,10 +14,11 @@ mod stage;
 use args::Args;
 use stage::{Props, Stage};
 use std::error::Error;
+use std::f64::consts::TAU;
 use std::process::ExitCode;
 use truehit::glam::{DAffine3, DQuat, DVec2, DVec3, dvec2};
 use truehit::shading::color::srgb;
-use truehit::shading::{Background, Checker, Light, Material, Mirror, Rgb};
+use truehit::shading::{Background, Light, Material, Mirror, Rgb};
 use truehit::{Aabb, Affine, Cylinder, Hit, Interval, Plane, Ray, Shape, Sphere};
 
 /// z = x² + y² for z ≤ 1: an open dish with its focus at z = ¼. Its normal points out of the dish, downwards.
@@ -63,7 +64,7 @@ impl Shape for Paraboloid {
     /// Optional: around the dish, and up from its bottom.
     fn texture_coordinates(&self, ray: &Ray, hit: &Hit) -> DVec2 {
         let p = ray.at(hit.lambda);
-        dvec2(p.y.atan2(p.x) / std::f64::consts::TAU, p.z)
+        dvec2(p.y.atan2(p.x) / TAU, p.z)
     }
 
     /// Optional: a spawned ray has left once f at its origin certainly has the right sign.
@@ -97,8 +98,7 @@ fn run() -> Result<(), Box<dyn Error>> {
 /// A dish that faces the camera, a ball in its focus.
 fn stage() -> Result<Stage, Box<dyn Error>> {
     let mut props = Props::default();
-    let tiles = Checker::new(srgb(230, 214, 192), srgb(206, 186, 160), [0.5, 0.5]);
-    let floor = Material::matt([1.0; 3]).with_texture(tiles).with_mirror(Mirror::fading([0.2; 3], 3.0));
+    let floor = Material::matt(srgb(226, 206, 178)).with_mirror(Mirror::fading([0.2; 3], 3.0));
     props.put("floor", Plane::new([0.0; 3], [0.0, 0.0, 1.0])?, &floor);
     let silver = Material::matt(srgb(60, 62, 66)).with_gloss(0.6, 300.0).with_mirror(Mirror::even([0.8; 3]));
     let dish = DAffine3::from_scale_rotation_translation(
@@ -112,16 +112,21 @@ fn stage() -> Result<Stage, Box<dyn Error>> {
     props.put("ball", Sphere::new(focus, 0.12)?, &red);
     let stick = Material::matt(srgb(40, 42, 46)).with_gloss(0.3, 60.0);
     props.put("stick", Cylinder::new(dish.transform_point3(DVec3::ZERO), focus, 0.02)?, &stick);
-    // Something for the dish to bend.
-    let teal = Material::matt(srgb(24, 104, 112)).with_gloss(0.3, 50.0);
-    let mustard = Material::matt(srgb(222, 160, 40)).with_gloss(0.35, 60.0);
-    for (x, y, height, material) in [(-2.6, -0.4, 1.5, &teal), (2.3, -1.3, 0.8, &mustard), (3.1, 0.6, 2.2, &teal)] {
-        props.put("column", Cylinder::new([x, y, 0.0], [x, y, height], 0.32)?, material);
+    // A ring of columns around dish and camera, for the dish to bend.
+    let colors = [srgb(24, 104, 112), srgb(222, 160, 40), srgb(238, 226, 204), srgb(34, 50, 94), srgb(134, 162, 128)];
+    for k in 0..17_u32 {
+        let (sin, cos) = (TAU * (f64::from(k) + 0.5) / 17.0).sin_cos();
+        let foot = DVec3::new(4.6 * sin, 4.6 * cos, 0.0);
+        let height = DVec3::new(0.0, 0.0, 1.0 + f64::from(k * 5 % 4) * 0.45);
+        let material = Material::matt(colors[k as usize % 5]).with_gloss(0.3, 50.0);
+        if foot.y > -2.0 || foot.x > 0.0 && foot.x < 1.5 {
+            props.put("column", Cylinder::new(foot, foot + height, 0.3)?, &material);
+        }
     }
     let (scene, names) = props.finish();
     let target = DVec3::new(0.0, 0.6, 1.3);
     let lights =
-        vec![Light::point([-4.0, -5.0, 6.0], [0.8; 3]), Light::directional([0.8, -0.5, 0.4], [0.16, 0.18, 0.24])];
+        vec![Light::directional([-4.0, -5.0, 6.0], [0.8; 3]), Light::directional([0.8, -0.5, 0.4], [0.16, 0.18, 0.24])];
     Ok(Stage {
         scene,
         names,

@@ -1,6 +1,6 @@
 //! The examples, run as a user runs them: what they write, what they say, how they fail.
 //!
-//! `cargo test` builds them; after `cargo test --test examples` alone they may be missing or old.
+//! `cargo test` builds them; `cargo test --test examples` alone does not: `cargo build --profile test --examples` does.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,11 +18,7 @@ fn run(example: &str, directory: &Path, arguments: &[&str]) -> Output {
     // target/debug/deps/examples-… → target/debug/examples
     let built = std::env::current_exe().unwrap().parent().unwrap().with_file_name("examples");
     let program = built.join(format!("{example}{}", std::env::consts::EXE_SUFFIX));
-    assert!(
-        program.exists(),
-        "{} is not built: run `cargo test`, or `cargo build --examples` first",
-        program.display()
-    );
+    assert!(program.exists(), "{} is not built: run `cargo build --profile test --examples` first", program.display());
     Command::new(program).args(arguments).current_dir(directory).output().unwrap()
 }
 
@@ -55,7 +51,11 @@ fn assert_failed(output: &Output, directory: &Path, message: &str) {
     assert!(stderr.starts_with("error: ") && stderr.contains(message), "{stderr:?} lacks {message:?}");
     assert_eq!(stderr.lines().count(), 1, "{stderr}");
     assert_eq!(text(&output.stdout), "");
-    assert!(files(directory).iter().all(|name| name.ends_with(".obj")), "{:?}", files(directory));
+    assert!(
+        files(directory).iter().all(|name| Path::new(name).extension().is_some_and(|e| e == "obj")),
+        "{:?}",
+        files(directory)
+    );
 }
 
 #[test]

@@ -13,7 +13,7 @@ const GENERATIONS: usize = 5;
 
 pub(crate) fn flake() -> Result<Stage, InvalidShape> {
     let mut props = Props::default();
-    let tiles = Checker::new(srgb(228, 224, 216), srgb(150, 158, 160), [0.5, 0.5]);
+    let tiles = Checker::new(srgb(222, 218, 210), srgb(198, 198, 196), [0.5, 0.5]);
     let floor = Material::matt([1.0; 3]).with_texture(tiles).with_mirror(Mirror::fading([0.2; 3], 4.0));
     props.put("floor", Plane::new([0.0; 3], [0.0, 0.0, 1.0])?, &floor);
 
@@ -36,19 +36,19 @@ pub(crate) fn flake() -> Result<Stage, InvalidShape> {
         }
     }
     let (scene, names) = props.finish();
-    let target = DVec3::new(0.0, 0.0, 1.35);
+    let target = DVec3::new(0.0, 0.0, 1.72);
     let lights =
-        vec![Light::point([-5.0, -5.0, 7.0], [0.8; 3]), Light::directional([0.8, -0.5, 0.4], [0.16, 0.18, 0.24])];
+        vec![Light::directional([-5.0, -5.0, 7.0], [0.8; 3]), Light::directional([0.8, -0.5, 0.4], [0.16, 0.18, 0.24])];
     Ok(Stage {
         scene,
         names,
         lights,
         ambient: Rgb::splat(0.2),
-        background: Background::Sky { up: DVec3::Z, horizon: srgb(232, 226, 220), zenith: srgb(86, 130, 170) },
-        eye: DVec3::new(1.5, -6.6, 2.7),
+        background: Background::Sky { up: DVec3::Z, horizon: srgb(226, 222, 216), zenith: srgb(86, 130, 170) },
+        eye: DVec3::new(1.5, -6.6, 3.1),
         target,
         up: DVec3::Z,
-        field_of_view: 32.0,
+        field_of_view: 35.0,
     })
 }
 

@@ -28,7 +28,7 @@ pub(crate) fn load(path: &Path) -> Result<Obj, String> {
     let options =
         tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
     // Materials are not used; a missing library is no error.
-    let loaded = tobj::load_obj_buf(&mut reader, &options, |_| Ok((Vec::new(), Default::default())));
+    let loaded = tobj::load_obj_buf(&mut reader, &options, |_| tobj::load_mtl_buf(&mut io::empty()));
     let (models, _) = loaded.map_err(|error| {
         if let Some(failure) = reader.failed.take() {
             return format!("cannot read {name}: {failure}");
@@ -189,7 +189,7 @@ impl<R: BufRead> BufRead for LineCounter<R> {
     fn consume(&mut self, amount: usize) {
         if let Ok(taken) = self.inner.fill_buf() {
             let taken = &taken[..amount];
-            self.lines += taken.iter().filter(|&&byte| byte == b'\n').count();
+            self.lines += taken.split(|&byte| byte == b'\n').count() - 1;
             if let Some(&last) = taken.last() {
                 self.mid_line = last != b'\n';
             }

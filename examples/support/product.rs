@@ -6,7 +6,7 @@ use std::error::Error;
 use truehit::glam::{DMat3, DVec3};
 use truehit::shading::color::srgb;
 use truehit::shading::{Background, ImageTexture, Light, Material, Mirror, Rgb};
-use truehit::{Aabb, Cone, Mesh};
+use truehit::{Aabb, Cone, Mesh, Plane};
 
 /// The picture's vertical angle, in degrees.
 const FIELD_OF_VIEW: f64 = 24.0;
@@ -38,7 +38,7 @@ pub(crate) fn product(
     let foot = DVec3::new(middle.x, bounds.min.y, middle.z);
     let height = 0.06 * reach;
     let table = Cone::truncated(foot - height * DVec3::Y, foot, 1.12 * reach, 1.1 * reach)?;
-    let ground = Cone::truncated(foot - 3.0 * height * DVec3::Y, foot - height * DVec3::Y, 40.0 * reach, 40.0 * reach)?;
+    let ground = Plane::new(foot - height * DVec3::Y, DVec3::Y)?;
 
     // Far enough that every vertex and the table's front are inside the picture's pyramid, seen from in front of the middle.
     let vertical = (0.5 * f64::to_radians(FIELD_OF_VIEW)).tan();

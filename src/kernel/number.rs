@@ -1,5 +1,5 @@
-//! One formula, two arithmetics: the ring that [`Bounded`](super::bounded::Bounded) and
-//! [`Dyadic`](super::dyadic::Dyadic) share, and the vector products over it.
+//! One formula, two arithmetics: the ring that [`Bounded`] and
+//! [`Dyadic`] share, and the vector products over it.
 //!
 //! A cold path writes its polynomial once over `N: Number`, evaluates it in `Bounded` and, where that leaves the sign
 //! open, again in `Dyadic`, which never does.
