@@ -40,6 +40,8 @@ fn main() -> ExitCode {
 
 fn run() -> Result<(), Box<dyn Error>> {
     let Some(args) = Args::parse(HELP, Args::new("instancing.png"))? else { return Ok(()) };
+    // Before anything is said: an output that cannot be written is no success.
+    png::check(&args.output)?;
     let petal = Arc::new(petal()?);
     let triangles = petal.triangles().len();
     println!("{triangles} triangles in memory, {} in the picture", triangles * PETALS as usize);

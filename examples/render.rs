@@ -35,6 +35,8 @@ Usage: cargo run --release --example render -- [OPTIONS]
   --mesh FILE.obj      this mesh instead, framed automatically
   --texture FILE       an image (PNG or JPEG) for the mesh's texture coordinates
   --orbit AROUND,ABOVE where the camera stands around the mesh, in degrees [default: 30,18]
+  --eye X,Y,Z          or where it stands, in the mesh's coordinates (y is up), and
+  --target X,Y,Z       where it looks [default: the middle]: for a view from inside
   --size WIDTHxHEIGHT  in pixels [default: 960x640]
   --samples N          camera rays a pixel, rounded up to a square [default: 4]
   --threads N          [default: 0, one per core]
@@ -51,7 +53,7 @@ fn run() -> Result<(), Box<dyn Error>> {
         (Some(_), Some(_)) => return Err("--mesh and --scene exclude each other".into()),
         (Some(path), None) => {
             let texture = args.texture.as_deref().map(load_texture).transpose()?;
-            product::product(obj::load(path)?, texture, args.orbit, args.size)?
+            product::product(obj::load(path)?, texture, args.orbit, args.view, args.size)?
         }
         (None, Some("gallery") | None) => gallery::gallery()?,
         (None, Some("flake")) => flake::flake()?,

@@ -141,6 +141,7 @@ fn what_cannot_be_read_or_written_is_named() {
         (&["--size", "10"], "960x640"),
         (&["--samples", "0"], "1 to 65536"),
         (&["--orbit", "0,90"], "30,20"),
+        (&["--eye", "1,2"], "1.5,0,-2"),
         (&["--threads", "many"], "many"),
         (&["--bogus"], "--bogus"),
         (&["stray"], "stray"),

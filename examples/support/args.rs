@@ -22,6 +22,8 @@ pub(crate) struct Args {
     pub(crate) mesh: Option<PathBuf>,
     /// An image to wrap around it.
     pub(crate) texture: Option<PathBuf>,
+    /// Where the camera stands and where it looks, in the mesh's coordinates, instead of around it.
+    pub(crate) view: [Option<[f64; 3]>; 2],
     /// Degrees: where the camera stands around the mesh, and how high.
     pub(crate) orbit: [f64; 2],
 }
@@ -48,6 +50,7 @@ impl Args {
             scene: None,
             mesh: None,
             texture: None,
+            view: [None; 2],
             orbit: [30.0, 18.0],
         }
     }
@@ -75,6 +78,8 @@ impl Args {
                 Long("mesh") => args.mesh = Some(parser.value()?.into()),
                 Long("texture") => args.texture = Some(parser.value()?.into()),
                 Long("orbit") => args.orbit = parser.value()?.parse_with(orbit)?,
+                Long("eye") => args.view[0] = Some(parser.value()?.parse_with(point)?),
+                Long("target") => args.view[1] = Some(parser.value()?.parse_with(point)?),
                 Short('h') | Long("help") => {
                     println!("{help}");
                     return Ok(None);
@@ -93,6 +98,11 @@ fn size(text: &str) -> Result<[u32; 2], &'static str> {
         [Ok(width @ 1..=16_384), Ok(height @ 1..=16_384)] => Ok([width, height]),
         _ => Err("must look like 960x640, each number from 1 to 16384"),
     }
+}
+
+fn point(text: &str) -> Result<[f64; 3], &'static str> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|x| x.trim().parse().ok()).collect();
+    numbers.try_into().map_err(|_| "must look like 1.5,0,-2")
 }
 
 fn orbit(text: &str) -> Result<[f64; 2], &'static str> {

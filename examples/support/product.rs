@@ -1,22 +1,23 @@
 //! A mesh from a file, put on a turntable and framed. x is right, y up, z towards the camera.
 
 use crate::obj::Obj;
-use crate::stage::{Props, Stage};
+use crate::stage::{Props, Stage, half_extent};
 use std::error::Error;
 use truehit::glam::{DMat3, DVec3};
 use truehit::shading::color::srgb;
 use truehit::shading::{Background, ImageTexture, Light, Material, Mirror, Rgb};
 use truehit::{Aabb, Cone, Mesh, Plane};
 
-/// The picture's vertical angle, in degrees.
+/// The picture's vertical angle from outside, in degrees.
 const FIELD_OF_VIEW: f64 = 24.0;
 
 /// `obj` seen from `around` degrees to the right of its front and `above` degrees above its middle, as near as shows
-/// it whole in a picture of this `size`.
+/// it whole in a picture of this `size`; or from `eye`, by a sun overhead and a lamp at the camera.
 pub(crate) fn product(
     obj: Obj,
     texture: Option<ImageTexture>,
     [around, above]: [f64; 2],
+    [eye, target]: [Option<[f64; 3]>; 2],
     size: [u32; 2],
 ) -> Result<Stage, Box<dyn Error>> {
     let bounds = Aabb::around(&obj.positions);
@@ -41,8 +42,7 @@ pub(crate) fn product(
     let ground = Plane::new(foot - height * DVec3::Y, DVec3::Y)?;
 
     // Far enough that every vertex and the table's front are inside the picture's pyramid, seen from in front of the middle.
-    let vertical = (0.5 * f64::to_radians(FIELD_OF_VIEW)).tan();
-    let horizontal = vertical * f64::from(size[0]) / f64::from(size[1]);
+    let [horizontal, vertical] = half_extent(FIELD_OF_VIEW, size);
     let rim = (0..32).map(|k| {
         let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / 32.0).sin_cos();
         foot + 1.1 * reach * DVec3::new(cos, 0.0, sin)
@@ -70,14 +70,17 @@ pub(crate) fn product(
     props.put("ground", ground, &Material::matt(srgb(196, 206, 208)));
     let (scene, names) = props.finish();
 
-    // Lights stand still relative to the camera: the key to the left and above, a cool one from the right.
-    let eye = middle + distance * back;
-    let from_camera = |x: f64, y: f64, z: f64| frame.transpose() * DVec3::new(x, y, z);
-    let key = middle + 6.0 * radius * from_camera(-0.7, 0.95, 0.75).normalize();
-    let lights = vec![
-        Light::point(key, [0.80, 0.76, 0.70]),
-        Light::directional(from_camera(0.9, 0.35, 0.5), [0.14, 0.17, 0.22]),
-    ];
+    let target = target.map_or(middle, DVec3::from);
+    let (eye, lights, field_of_view) = if let Some(eye) = eye.map(DVec3::from) {
+        let sun = Light::directional([0.3, 1.0, 0.2], [0.9, 0.85, 0.75]);
+        (eye, vec![sun, Light::point(eye + 0.02 * radius * DVec3::Y, [0.35, 0.36, 0.4])], 55.0)
+    } else {
+        // Lights stand still relative to the camera: the key to the left and above, a cool one from the right.
+        let from_camera = |x: f64, y: f64, z: f64| frame.transpose() * DVec3::new(x, y, z);
+        let key = Light::directional(from_camera(-0.7, 0.95, 0.75), [0.80, 0.76, 0.70]);
+        let fill = Light::directional(from_camera(0.9, 0.35, 0.5), [0.14, 0.17, 0.22]);
+        (middle + distance * back, vec![key, fill], FIELD_OF_VIEW)
+    };
     Ok(Stage {
         scene,
         names,
@@ -85,8 +88,8 @@ pub(crate) fn product(
         ambient: Rgb::new(0.2, 0.21, 0.22),
         background: Background::Sky { up: DVec3::Y, horizon: srgb(214, 222, 224), zenith: srgb(120, 150, 172) },
         eye,
-        target: middle,
+        target,
         up: DVec3::Y,
-        field_of_view: FIELD_OF_VIEW,
+        field_of_view,
     })
 }

@@ -32,10 +32,16 @@ impl Stage {
     }
 
     pub(crate) fn camera(&self, size: [u32; 2]) -> Result<Camera, InvalidCamera> {
-        let aspect = f64::from(size[0]) / f64::from(size[1]);
-        let half = (0.5 * self.field_of_view.to_radians()).tan() * (1.5 / aspect).max(1.0);
-        Camera::look_at(self.eye, self.target, self.up, 2.0 * half.atan(), size)
+        let [_, half_height] = half_extent(self.field_of_view, size);
+        Camera::look_at(self.eye, self.target, self.up, 2.0 * half_height.atan(), size)
     }
+}
+
+/// Half the width and height of what is seen at distance one; see [`Stage::field_of_view`].
+pub(crate) fn half_extent(field_of_view: f64, size: [u32; 2]) -> [f64; 2] {
+    let aspect = f64::from(size[0]) / f64::from(size[1]);
+    let half_height = (0.5 * field_of_view.to_radians()).tan() * (1.5 / aspect).max(1.0);
+    [half_height * aspect, half_height]
 }
 
 /// Collects objects with their names.
