@@ -6,6 +6,7 @@ use crate::kernel::dyadic::Dyadic;
 use crate::kernel::eft::{Fused, Product, Split, two_sum};
 use crate::kernel::number::{self, Number, Vector, cross, dot, vector};
 use crate::kernel::ratio::Ratio;
+use crate::kernel::scaled::{exponent_of, ldexp};
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -34,6 +35,8 @@ pub struct Affine<S> {
     object_from_world: DAffine3,
     world_from_object: DAffine3,
     bounds: Aabb,
+    /// At least ‖M‖, M = `object_from_world`, and ‖M⁻¹‖: by how much they may lengthen a vector.
+    norms: [f64; 2],
 }
 
 impl<S: Shape> Affine<S> {
@@ -51,7 +54,8 @@ impl<S: Shape> Affine<S> {
         // What the shape is defined by, inverted: not quite the map that was given.
         let world_from_object = inverse(&object_from_world)?;
         let bounds = shape.bounds_under(&world_from_object);
-        Ok(Self { shape, object_from_world, world_from_object, bounds })
+        let norms = [largest_stretch(&object_from_world.matrix3), largest_stretch(&world_from_object.matrix3)];
+        Ok(Self { shape, object_from_world, world_from_object, bounds, norms })
     }
 }
 
@@ -105,6 +109,17 @@ fn inverse(map: &DAffine3) -> Result<DAffine3, InvalidShape> {
         matrix3: DMat3::from_cols(row(&rows[0])?, row(&rows[1])?, row(&rows[2])?).transpose(),
         translation: DVec3::new(shift(&rows[0])?, shift(&rows[1])?, shift(&rows[2])?),
     })
+}
+
+/// At least |Mv|/|v| for every v, exact but for rounding where M turns and scales along its own axes: ‖M‖² is at most the
+/// largest absolute row sum of MᵀM.
+fn largest_stretch(m: &DMat3) -> f64 {
+    let largest = m.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+    let k = -exponent_of(largest);
+    let m = DMat3::from_cols_array(&m.to_cols_array().map(|x| ldexp(x, k)));
+    let gram = m.transpose() * m;
+    let rows = gram.x_axis.abs() + gram.y_axis.abs() + gram.z_axis.abs();
+    ldexp((rows.max_element() * (1.0 + 64.0 * U)).sqrt() * (1.0 + 4.0 * U), -k)
 }
 
 /// A ray's image: rounded, what rounding took away, and a bound on what even that leaves out.
@@ -252,7 +267,7 @@ impl<S: Shape> Shape for Affine<S> {
         // The map's entries are rounded, and so is the sum.
         let rounding = U * (norm(world) + rows.iter().map(|r| 2.0 * r.2).sum::<f64>());
         // An object-space error ε is at most ‖W‖ε here; along the normal, where it lies, it is ε/|Mᵀn|.
-        let stretched = error * w.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+        let stretched = error * self.norms[1];
         let n = self.object_from_world.matrix3.transpose() * self.shape.normal(&object_ray, hit);
         let across = 1.01 * error / n.length();
         let bends = self.curvature(world_ray, hit) * across;
@@ -267,20 +282,16 @@ impl<S: Shape> Shape for Affine<S> {
     fn curvature(&self, world_ray: &Ray, hit: &Hit) -> f64 {
         let object_ray = self.object_ray(world_ray);
         let n = self.object_from_world.matrix3.transpose() * self.shape.normal(&object_ray, hit);
-        let largest = self.object_from_world.matrix3.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs()));
         // κ‖M‖²/|Mᵀn|, in an order that stays in range.
-        let stretch = 3.0 * largest / n.length();
-        self.shape.curvature(&object_ray, hit) * (3.0 * largest) * stretch
+        self.shape.curvature(&object_ray, hit) * self.norms[0] * (self.norms[0] / n.length())
     }
 
     fn normal_error(&self, world_ray: &Ray, hit: &Hit) -> f64 {
         let object_ray = self.object_ray(world_ray);
-        let m = &self.object_from_world.matrix3;
-        let n = m.transpose() * self.shape.normal(&object_ray, hit);
-        // |δ(Mᵀn)| ≤ ‖M‖(|δn| + a few u), and at most twice its share of the length of what is normalised.
+        let n = self.object_from_world.matrix3.transpose() * self.shape.normal(&object_ray, hit);
+        // |δ(Mᵀn)| ≤ ‖M‖(|δn| + a few u); of it only what is across Mᵀn turns the unit vector.
         let error = self.shape.normal_error(&object_ray, hit) + 8.0 * U;
-        let stretch = 3.0 * m.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs())) / n.length();
-        2.0 * error * stretch + 8.0 * U
+        1.01 * error * (self.norms[0] / n.length()) + 8.0 * U
     }
 
     fn precise_lambda(&self, world_ray: &Ray, hit: &Hit) -> [f64; 2] {

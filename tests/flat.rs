@@ -7,11 +7,12 @@ use std::cmp::Ordering;
 use std::fmt::Debug;
 use support::cases::{Case, Kernel, Solid};
 use support::families;
+use support::shapes::{as_stored, shape};
 use support::sweep::{Row, quantile, sweep};
 use truehit::glam::DVec2;
 use truehit::glam::DVec3;
 use truehit::kernel::{eft, plane, polygon, slab, triangle};
-use truehit::{Affine, Cone, Hit, Interval, Plane, Polygon, Ray, Shape, Sphere, Triangle};
+use truehit::{Hit, Interval, Polygon, Ray, Shape};
 
 /// m·2^e, exactly: dashu's integers, nothing of truehit's.
 #[derive(Clone, Debug)]
@@ -511,33 +512,13 @@ fn show(kernel: Kernel, number: u32, name: &str, row: &Row) {
     }
 }
 
-/// The shape of a case, if its constructor is here.
-fn shape(solid: &Solid) -> Option<Box<dyn Shape>> {
-    Some(match solid {
-        Solid::Plane { point, normal } => Box::new(Plane::new(*point, *normal).unwrap()),
-        Solid::Polygon(contours) => {
-            let holes: Vec<&[DVec3]> = contours[1..].iter().map(Vec::as_slice).collect();
-            Box::new(Polygon::with_holes(&contours[0], &holes).unwrap())
-        }
-        Solid::Sphere { center, radius } => Box::new(Sphere::new(*center, *radius).unwrap()),
-        Solid::Frustum { base, top, base_radius, top_radius } => {
-            Box::new(Cone::truncated(*base, *top, *base_radius, *top_radius).unwrap())
-        }
-        Solid::Triangle([a, b, c]) => Box::new(Triangle::new(*a, *b, *c).unwrap()),
-        _ => return None,
-    })
-}
-
 #[test]
 fn affine_maps_in_every_family() {
     for family in families::all().into_iter().filter(|f| f.kernel == Kernel::Affine) {
         let mut row = Row::default();
         for i in 0..4000 {
-            let mut case = family.case(i);
-            let Solid::Affine { world_from_object, object_from_world, inner } = &mut case.solid else { unreachable!() };
-            let Some(shape) = shape(inner) else { continue };
-            let affine = Affine::new(shape, *world_from_object).unwrap();
-            *object_from_world = *affine.object_from_world();
+            let case = as_stored(family.case(i));
+            let Some(Ok(affine)) = shape(&case.solid) else { unreachable!() };
             let hit = affine.intersect(&case.ray, case.within);
             row.add(&case, hit);
         }
