@@ -21,6 +21,10 @@ pub const UNDERFLOW: f64 = f64::from_bits((1023 - 1000) << 52); // 2⁻¹⁰⁰�
 /// components; the last one covers the bound's own arithmetic.
 pub const TRIANGLE_SIDES: f64 = 50.0 * U;
 
+/// Triangle, docs/numerics.md §4: with the residual r, the terms' size S and the condition κ, one refinement step leaves λ
+/// off by (κ/|d|∞)·u·(|r|∞(first + second·κ) + third·uS), beside its last rounding.
+pub const TRIANGLE_STEP: [f64; 3] = [87.0, 355.0, 150.0];
+
 /// Plane, docs/numerics.md §3: λ beyond its last rounding is off by this times u²κ(P_N/|D| + |λ|κ), where P are the sums of
 /// the products' absolute values and κ = P_D/|D|.
 pub const PLANE_QUOTIENT: f64 = 160.0 * U * U;

@@ -5,7 +5,7 @@
 //! weights to the last bit, and its size is the proof. Where the filter is silent the signs are found in integers,
 //! double-doubles or [`Dyadic`]s. docs/numerics.md §4.
 
-use super::bound::{LARGE, SMALL, TRIANGLE_SIDES, U, UNDERFLOW};
+use super::bound::{LARGE, SMALL, TRIANGLE_SIDES, TRIANGLE_STEP, U, UNDERFLOW};
 use super::bounded::Bounded;
 use super::cpu;
 use super::dyadic::Dyadic;
@@ -92,7 +92,7 @@ pub fn intersect_with<P: Product>(ray: &Ray, vertices: &[DVec3; 3], within: Inte
         u += qr.dot(e2) * inverse;
         v -= qr.dot(e1) * inverse;
         lambda -= n.dot(r) * inverse;
-        let (step, least) = (largest(r) * (87.0 + 355.0 * kappa), 150.0 * (U * size));
+        let (step, least) = (largest(r) * (TRIANGLE_STEP[0] + TRIANGLE_STEP[1] * kappa), TRIANGLE_STEP[2] * (U * size));
         let beyond_rounding = condition * (U * (step + least)) + vanished * (1.0 + m12 + size);
         let error = (U * lambda.abs() + beyond_rounding) * (1.0 + 4.0 * U);
         let tolerated = 3.0 * U * lambda.abs();
@@ -313,4 +313,82 @@ pub fn side(vertices: &[DVec3; 3], point: DVec3) -> Ordering {
         dot(&cross(&difference(b, a), &difference(c, a)), &difference(point, a))
     }
     number::sign_of(|| form(vertices, point), || form(vertices, point))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use proptest::test_runner::{Config, TestRunner};
+
+    /// The largest |error|/(u·size) of the edge functions in plain f64, by hill climbing from random rays.
+    #[test]
+    fn the_filter_holds_against_an_adversary() {
+        let ratio = |x: &[f64]| {
+            let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
+            let (ray, t) = (Ray::new(v(0), v(3)), [v(6), v(9), v(12)]);
+            let (d, e1, e2, s) = (ray.direction, t[1] - t[0], t[2] - t[0], ray.origin - t[0]);
+            let (q, det) = (d.cross(s), e1.cross(e2).dot(d));
+            let (su, sv) = (q.dot(e2), -q.dot(e1));
+            let (m1, m2, ms) = (largest(e1), largest(e2), largest(s));
+            let size = U * (largest(d) * (m1 * m2 + ms * (m1 + m2)));
+            let exact = sides::<Dyadic>(&ray, &t);
+            let off = |i: usize, f: f64| exact[i].minus(&f.into()).approximately().abs() / size;
+            off(0, su).max(off(1, sv)).max(off(2, det - su - sv))
+        };
+        let mut runner = TestRunner::new_with_rng(
+            Config::default(),
+            proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha),
+        );
+        let mut draw = |n: usize| {
+            let strategy = prop::collection::vec(-1.0..1.0f64, n);
+            proptest::strategy::ValueTree::current(&strategy.new_tree(&mut runner).unwrap())
+        };
+        let mut worst: f64 = 0.0;
+        for _ in 0..40 {
+            let mut x = draw(15);
+            let mut best = ratio(&x);
+            for k in 0..400 {
+                let (step, mut y) = (draw(15), x.clone());
+                let scale = 0.5f64.powi(k / 10);
+                for i in 0..15 {
+                    y[i] += scale * step[i];
+                }
+                let r = ratio(&y);
+                if r > best {
+                    (x, best) = (y, r);
+                }
+            }
+            worst = worst.max(best);
+        }
+        println!("largest |error|/bound of the edge filter: {:.3}", worst * U / TRIANGLE_SIDES);
+        assert!(worst > 1.0 && worst * U < TRIANGLE_SIDES);
+    }
+
+    /// A ray through an edge or a vertex of a closed surface crosses an even number of triangles.
+    #[test]
+    fn crossings_of_a_closed_surface_are_even() {
+        let p = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64);
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let cube: Vec<[DVec3; 3]> =
+            quads.iter().flat_map(|q| [[p(q[0]), p(q[1]), p(q[2])], [p(q[0]), p(q[2]), p(q[3])]]).collect();
+        let (mut through, mut touching) = (0, 0);
+        for i in 0..125 {
+            let target = DVec3::new((i % 5) as f64, (i / 5 % 5) as f64, (i / 25) as f64) * 0.25;
+            for j in 0..27 {
+                let direction = DVec3::new((j % 3) as f64 - 1.0, (j / 3 % 3) as f64 - 1.0, (j / 9) as f64 - 1.0);
+                if direction == DVec3::ZERO {
+                    continue;
+                }
+                let ray = Ray::new(target - 7.0 * direction, direction);
+                let crossed = cube.iter().filter(|t| crosses(&ray, t)).count();
+                let hit = cube.iter().filter(|t| intersect(&ray, t, Interval::LINE).is_some()).count();
+                assert!(crossed == 0 || crossed == 2, "{ray:?} crosses {crossed}");
+                through += usize::from(crossed == 2);
+                touching += usize::from(hit > crossed);
+            }
+        }
+        println!("{through} rays cross, {touching} touch edges or vertices");
+        assert!(through > 1000 && touching > 500);
+    }
 }
