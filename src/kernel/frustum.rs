@@ -8,6 +8,7 @@ use super::bound::{U, UNDERFLOW};
 use super::cpu;
 use super::eft::{Fused, Product, Split, two_diff, two_sum};
 use super::number::{Number, Vector, cross, difference, dot, vector};
+use super::pair::{Pair, in_range, plain_cross, plain_dot, taxicab};
 use super::section::{End, Quadratic, Undecided, fine, nearest, precise, refined, sign};
 use crate::hit::Hit;
 use crate::interval::Interval;
@@ -72,59 +73,6 @@ const WALL_RESIDUAL: f64 = 256.0 * U * U;
 /// Of the wall's slope: this·d·(|q|₁ + R·|Δr|·v/h²).
 const SLOPE: f64 = 24.0 * U;
 
-/// An exact difference: hi + lo.
-#[derive(Clone, Copy)]
-struct Pair {
-    hi: DVec3,
-    lo: DVec3,
-}
-
-impl Pair {
-    #[inline(always)]
-    fn difference(a: DVec3, b: DVec3) -> Self {
-        let ((x, xe), (y, ye), (z, ze)) = (two_diff(a.x, b.x), two_diff(a.y, b.y), two_diff(a.z, b.z));
-        Self { hi: DVec3::new(x, y, z), lo: DVec3::new(xe, ye, ze) }
-    }
-
-    /// self + s·d, to about 2u² of what is added.
-    #[inline(always)]
-    fn moved<P: Product>(&self, s: f64, d: DVec3) -> Self {
-        let ((px, pxe), (py, pye), (pz, pze)) =
-            (P::two_product(s, d.x), P::two_product(s, d.y), P::two_product(s, d.z));
-        let ((x, xe), (y, ye), (z, ze)) = (two_sum(self.hi.x, px), two_sum(self.hi.y, py), two_sum(self.hi.z, pz));
-        let lo = DVec3::new(xe + (pxe + self.lo.x), ye + (pye + self.lo.y), ze + (pze + self.lo.z));
-        Self { hi: DVec3::new(x, y, z), lo }
-    }
-
-    /// self · other as an unevaluated sum.
-    #[inline(always)]
-    fn dot<P: Product>(&self, other: &Self) -> (f64, f64) {
-        let (a, b) = (self, other);
-        let (x, xe) = P::two_product(a.hi.x, b.hi.x);
-        let (y, ye) = P::two_product(a.hi.y, b.hi.y);
-        let (z, ze) = P::two_product(a.hi.z, b.hi.z);
-        let (s, se) = two_sum(x, y);
-        let (t, te) = two_sum(s, z);
-        let mixed = plain_dot(a.hi, b.lo) + plain_dot(a.lo, b.hi);
-        (t, (se + te) + ((xe + ye) + ze) + mixed)
-    }
-}
-
-#[inline(always)]
-fn plain_dot(a: DVec3, b: DVec3) -> f64 {
-    a.x * b.x + a.y * b.y + a.z * b.z
-}
-
-#[inline(always)]
-fn plain_cross(a: DVec3, b: DVec3) -> DVec3 {
-    DVec3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
-}
-
-#[inline(always)]
-fn taxicab(v: DVec3) -> f64 {
-    v.x.abs() + v.y.abs() + v.z.abs()
-}
-
 /// λ = `lambda` + `lo` to within `rest`; a `rest` of NaN where nothing is proved.
 #[derive(Clone, Copy)]
 struct Solved {
@@ -147,14 +95,8 @@ fn fast<P: Product>(ray: &Ray, base: DVec3, top: DVec3, r0: f64, r1: f64, within
     let w = plain_cross(x.hi, d);
     let n = plain_cross(d, v.hi);
     let w1 = w + n;
-    // Where the line crosses the planes of the caps.
-    let crossing = |moment: DVec3, r: f64| {
-        let reach = r * rate;
-        let across = plain_cross(moment, v.hi);
-        let value = reach * reach - plain_dot(across, across);
-        (value, scale * (CROSSING[0] * reach.abs() + CROSSING[1] * scale))
-    };
-    let ((at_base, base_error), (at_top, top_error)) = (crossing(w, r0), crossing(w1, r1));
+    let ((at_base, base_error), (at_top, top_error)) =
+        (crossing(w, v.hi, r0, rate, scale), crossing(w1, v.hi, r1, rate, scale));
     // NaN fails every one of these.
     let ordinary = in_range(dl, 100) & in_range(vl, 100) & (size < TOO_LARGE) & (r0 >= 0.0) & (r1 >= 0.0);
     let told = (at_base.abs() > base_error) & (at_top.abs() > top_error) & (rate.abs() > RATE * dl * vl);
@@ -163,17 +105,11 @@ fn fast<P: Product>(ray: &Ray, base: DVec3, top: DVec3, r0: f64, r1: f64, within
     }
     let h2 = plain_dot(v.hi, v.hi);
     let on_wall = (at_base < 0.0) & (at_top < 0.0);
-    let wide = (vl + growth.abs()) * scale;
-    let g = r0 * n - growth * w;
-    let (vw, slope) = (plain_dot(v.hi, w), growth * rate);
-    let leading = h2 * plain_dot(n, n) - slope * slope;
-    let discriminant = h2 * plain_dot(g, g) - (h2 + growth * growth) * (vw * vw);
+    let slope = growth * rate;
+    let [(leading, leading_error), (discriminant, discriminant_error)] =
+        wall_signs(w, n, v.hi, r0, growth, rate, dl * vl, scale);
     if on_wall {
-        let leading_error = LEADING * (h2 + growth * growth) * ((dl * vl) * (dl * vl));
-        let discriminant_error = wide * (DISCRIMINANT[0] * vl * taxicab(g) + DISCRIMINANT[1] * wide);
-        let turn_error = TURN * dl * vl * wide;
-        let from_base = h2 * plain_dot(n, w) - growth * r0 * (rate * rate);
-        let from_top = h2 * plain_dot(n, w1) - growth * r1 * (rate * rate);
+        let [(from_base, turn_error), (from_top, _)] = turns(w, n, v.hi, [r0, r1], growth, rate, dl, scale);
         if (discriminant < -discriminant_error)
             | (leading < -leading_error)
             | (from_base > turn_error)
@@ -229,6 +165,44 @@ fn fast<P: Product>(ray: &Ray, base: DVec3, top: DVec3, r0: f64, r1: f64, within
     None
 }
 
+/// r²(d·v)² − |w × v|² and a bound on its error: whether the line with that moment about a cap's centre crosses the
+/// cap's plane inside its circle.
+#[inline(always)]
+fn crossing(moment: DVec3, v: DVec3, r: f64, rate: f64, scale: f64) -> (f64, f64) {
+    let reach = r * rate;
+    let across = plain_cross(moment, v);
+    let value = reach * reach - plain_dot(across, across);
+    (value, scale * (CROSSING[0] * reach.abs() + CROSSING[1] * scale))
+}
+
+/// A and D/h⁴ with bounds on their errors.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn wall_signs(w: DVec3, n: DVec3, v: DVec3, r0: f64, growth: f64, rate: f64, dv: f64, scale: f64) -> [(f64, f64); 2] {
+    let (h2, vl) = (plain_dot(v, v), taxicab(v));
+    let wide = (vl + growth.abs()) * scale;
+    let g = r0 * n - growth * w;
+    let (vw, slope) = (plain_dot(v, w), growth * rate);
+    let spread = h2 + growth * growth;
+    [
+        (h2 * plain_dot(n, n) - slope * slope, LEADING * spread * (dv * dv)),
+        (
+            h2 * plain_dot(g, g) - spread * (vw * vw),
+            wide * (DISCRIMINANT[0] * vl * taxicab(g) + DISCRIMINANT[1] * wide),
+        ),
+    ]
+}
+
+/// The slopes of the wall's polynomial at the planes of base and top, times d·v/h², with bounds on their errors.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn turns(w: DVec3, n: DVec3, v: DVec3, r: [f64; 2], growth: f64, rate: f64, dl: f64, scale: f64) -> [(f64, f64); 2] {
+    let (h2, vl) = (plain_dot(v, v), taxicab(v));
+    let error = TURN * dl * vl * ((vl + growth.abs()) * scale);
+    let turn = |w: DVec3, r: f64| (h2 * plain_dot(n, w) - growth * r * (rate * rate), error);
+    [turn(w, r[0]), turn(w + n, r[1])]
+}
+
 /// Lengths stay below this, so that forms of degree eight do not overflow.
 const TOO_LARGE: f64 = (1u128 << 100) as f64;
 
@@ -274,12 +248,7 @@ fn wall_step<P: Product>(
         let (radius, radius_lo) = two_sum(r0, grown);
         (height, radius, radius_lo + (grown_lo + (k * height + k_lo * s)))
     };
-    let ((x2, x2_lo), (y2, y2_lo)) = (P::two_product(q.hi.x, q.hi.x), P::two_product(q.hi.y, q.hi.y));
-    let ((z2, z2_lo), (r2, r2_lo)) = (P::two_product(q.hi.z, q.hi.z), P::two_product(radius, radius));
-    let ((a, a_lo), (b, b_lo)) = (two_sum(x2, y2), two_diff(z2, r2));
-    let (residual, residual_lo) = two_sum(a, b);
-    let mixed = plain_dot(q.lo, 2.0 * q.hi + q.lo) - radius_lo * (2.0 * radius + radius_lo);
-    let residual = residual + ((residual_lo + (a_lo + b_lo)) + ((x2_lo + y2_lo) + (z2_lo - r2_lo)) + mixed);
+    let residual = q.squared_less::<P>(radius, radius_lo);
     let growth_rate = growth * rate * over_h2;
     let slope = plain_dot(rounded, d) - height * rate - (radius + radius_lo) * growth_rate;
     let half = 0.5 / slope;
@@ -296,13 +265,6 @@ fn wall_step<P: Product>(
     // The step must be small against the bend, and the slope known, and of the right sign.
     let proved = (32.0 * bend * step * half < 1.0) & (128.0 * slope_error * half < 1.0) & (slope * turn > 0.0);
     Solved { lambda, lo, rest: if proved { rest } else { f64::NAN } }
-}
-
-/// 2⁻ᵉ ≤ x < 2ᵉ
-#[inline(always)]
-fn in_range(x: f64, e: u64) -> bool {
-    let least = (1023 - e) << 52;
-    x.to_bits().wrapping_sub(least) < (2 * e) << 52
 }
 
 /// By references and scalars, so that the caller's vectors stay in registers.
@@ -498,4 +460,182 @@ fn locate<N: Number>(point: DVec3, solid: &Solid) -> Result<Ordering, Undecided>
     let beside = sign(&h2.times(&dot(&m, &m)).minus(&radius.squared()))?;
     // Outside one is outside; else on one is on it.
     Ok(below.max(above).max(beside))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::search::{Rational, climb, cross3, dot3, each, exact, minus};
+    use super::*;
+
+    /// Base, top, radii and a ray from near or far, with few relations or near-ties between them.
+    fn setting(x: &[f64]) -> (Ray, Solid) {
+        let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
+        let base = v(0);
+        let top = base + v(3) * 2f64.powf(4.0 * x[14]);
+        let base_radius = x[12].abs();
+        let top_radius = if x[13] < -0.5 { base_radius } else { x[13].abs() };
+        let direction = v(6);
+        // A point of the wall or near it, and a way back from it.
+        let s = x[15].abs();
+        let across = direction.cross(top - base).normalize_or(DVec3::X);
+        let radius = base_radius + s * (top_radius - base_radius);
+        let near = base + s * (top - base) + across * radius * (1.0 - x[9].abs().powi(8)) + x[10].powi(5) * DVec3::Y;
+        let origin = near - direction * 2f64.powf(5.0 + 5.0 * x[11]);
+        (Ray { origin, direction }, Solid { base, top, base_radius, top_radius })
+    }
+
+    const DIMENSION: usize = 16;
+
+    struct Rounded {
+        x: Pair,
+        y: Pair,
+        v: Pair,
+        w: DVec3,
+        n: DVec3,
+        rate: f64,
+        growth: f64,
+        dl: f64,
+        vl: f64,
+        size: f64,
+    }
+
+    fn rounded(ray: &Ray, solid: &Solid) -> Rounded {
+        let x = Pair::difference(ray.origin, solid.base);
+        let v = Pair::difference(solid.top, solid.base);
+        let d = ray.direction;
+        let vl = taxicab(v.hi);
+        Rounded {
+            y: Pair::difference(ray.origin, solid.top),
+            w: plain_cross(x.hi, d),
+            n: plain_cross(d, v.hi),
+            rate: plain_dot(d, v.hi),
+            growth: solid.top_radius - solid.base_radius,
+            dl: taxicab(d),
+            vl,
+            size: taxicab(x.hi) + vl + (solid.base_radius + solid.top_radius),
+            x,
+            v,
+        }
+    }
+
+    fn rational(x: f64) -> Rational {
+        Rational::try_from(x).unwrap()
+    }
+
+    fn off(value: f64, exact: &Rational, bound: f64) -> f64 {
+        ((exact - rational(value)).to_f64().value() / bound).abs()
+    }
+
+    /// For bounds that need only hold where value or exact value is not negative.
+    fn off_inside(value: f64, exact: &Rational, bound: f64) -> Option<f64> {
+        (value >= 0.0 || *exact >= Rational::ZERO).then(|| off(value, exact, bound))
+    }
+
+    #[test]
+    fn no_input_reaches_the_bounds_of_the_signs() {
+        // crossing, A, D, turn
+        for (k, name) in ["crossing", "A", "D", "turn"].into_iter().enumerate() {
+            let worst = climb(&format!("frustum: {name}"), DIMENSION, |t| {
+                let (ray, solid) = setting(t);
+                let r = rounded(&ray, &solid);
+                let scale = r.dl * r.vl * r.size;
+                let (v, d) = (minus(solid.top, solid.base), exact(ray.direction));
+                let w = cross3(&minus(ray.origin, solid.top), &d);
+                let base_w = cross3(&minus(ray.origin, solid.base), &d);
+                let n = cross3(&d, &v);
+                let (rate, h2) = (dot3(&d, &v), dot3(&v, &v));
+                let (r0, r1) = (rational(solid.base_radius), rational(solid.top_radius));
+                let growth = &r1 - &r0;
+                let rate2 = &rate * &rate;
+                match k {
+                    0 => {
+                        let (value, bound) = crossing(r.w + r.n, r.v.hi, solid.top_radius, r.rate, scale);
+                        let across = cross3(&w, &v);
+                        off_inside(value, &(&r1 * &r1 * rate2 - dot3(&across, &across)), bound)
+                    }
+                    3 => {
+                        let radii = [solid.base_radius, solid.top_radius];
+                        let (value, bound) = turns(r.w, r.n, r.v.hi, radii, r.growth, r.rate, r.dl, scale)[1];
+                        Some(off(value, &(h2 * dot3(&n, &w) - growth * r1 * rate2), bound))
+                    }
+                    _ => {
+                        let signs =
+                            wall_signs(r.w, r.n, r.v.hi, solid.base_radius, r.growth, r.rate, r.dl * r.vl, scale);
+                        let (value, bound) = signs[k - 1];
+                        let growth2 = &growth * &growth;
+                        if k == 1 {
+                            Some(off(value, &(h2 * dot3(&n, &n) - growth2 * rate2), bound))
+                        } else {
+                            let g = [0, 1, 2].map(|i| &r0 * &n[i] - &growth * &base_w[i]);
+                            let vw = dot3(&v, &base_w);
+                            off_inside(value, &(&h2 * dot3(&g, &g) - (&h2 + growth2) * &vw * &vw), bound)
+                        }
+                    }
+                }
+            });
+            assert!((0.003..1.0).contains(&worst), "{name}: {worst}");
+        }
+    }
+
+    #[test]
+    fn no_input_reaches_the_bounds_of_the_steps() {
+        for (wall, name) in [(false, "frustum: λ on a cap's plane"), (true, "frustum: λ on the wall")] {
+            let worst = climb(name, DIMENSION, |t| {
+                let (ray, solid) = setting(t);
+                let (r, d) = (rounded(&ray, &solid), ray.direction);
+                let (x, v, ed) = (minus(ray.origin, solid.base), minus(solid.top, solid.base), exact(d));
+                let (rate, h2) = (dot3(&ed, &v), dot3(&v, &v));
+                let to_f64 = |q: Rational| q.to_f64().value();
+                if !wall {
+                    if r.rate.abs() <= RATE * r.dl * r.vl {
+                        return None;
+                    }
+                    let s = plane_step::<Split>(&r.y, &r.v, d, r.rate, r.dl * r.vl, r.vl * r.size);
+                    let exact = -dot3(&minus(ray.origin, solid.top), &v) / rate;
+                    return Some((to_f64(exact - rational(s.lambda) - rational(s.lo)) / s.rest).abs());
+                }
+                let (r0, r1) = (rational(solid.base_radius), rational(solid.top_radius));
+                let growth = r1 - &r0;
+                let (m, n) = (cross3(&x, &v), cross3(&ed, &v));
+                let (radius, slope) = (r0 * &h2 + &growth * dot3(&x, &v), growth * rate);
+                let a = &h2 * dot3(&n, &n) - &slope * &slope;
+                let b = &h2 * dot3(&m, &n) - &radius * &slope;
+                let c = &h2 * dot3(&m, &m) - &radius * &radius;
+                let (fa, fb, fc) = (to_f64(a.clone()), to_f64(b.clone()), to_f64(c.clone()));
+                let root = (fb * fb - fa * fc).max(0.0).sqrt();
+                let turn = t[11].signum();
+                let first = (turn * root - fb) / fa;
+                if !first.is_finite() {
+                    return None;
+                }
+                let vector = [solid.base_radius, solid.top_radius, r.growth];
+                let over_h2 = 1.0 / plain_dot(r.v.hi, r.v.hi);
+                let s = wall_step::<Split>(first, turn, &r.x, &r.v, d, vector, [r.dl, r.vl, r.size, r.rate, over_h2]);
+                if s.rest.is_nan() {
+                    return None;
+                }
+                let lambda = rational(s.lambda) + rational(s.lo);
+                let off = ((&a * &lambda + &b + &b) * &lambda + c) / (Rational::from(2) * (a * lambda + b));
+                (s.rest <= U * s.lambda.abs()).then(|| (to_f64(off) / s.rest).abs())
+            });
+            assert!((0.003..1.0).contains(&worst), "{name}: {worst}");
+        }
+    }
+
+    #[test]
+    fn both_products_answer_with_the_same_bits() {
+        let mut seen = [0; 2];
+        each(10_000, DIMENSION, |t| {
+            let (ray, s) = setting(t);
+            let within = Interval::FORWARD;
+            let answers = [
+                fast::<Fused>(&ray, s.base, s.top, s.base_radius, s.top_radius, within),
+                fast::<Split>(&ray, s.base, s.top, s.base_radius, s.top_radius, within),
+            ];
+            assert_eq!(answers[0], answers[1]);
+            seen[usize::from(answers[0].is_some())] += 1;
+        });
+        println!("{seen:?} misses and hits");
+        assert!(seen[0] > 500 && seen[1] > 1000);
+    }
 }

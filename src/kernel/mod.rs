@@ -8,10 +8,13 @@ pub mod eft;
 mod fixed;
 pub mod frustum;
 pub mod number;
+mod pair;
 pub mod plane;
 pub mod polygon;
 pub mod ratio;
 pub mod scaled;
+#[cfg(test)]
+mod search;
 mod section;
 pub mod slab;
 pub mod sphere;

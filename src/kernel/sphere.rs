@@ -9,8 +9,9 @@
 
 use super::bound::U;
 use super::cpu;
-use super::eft::{Fused, Product, Split, two_diff, two_sum};
+use super::eft::{Fused, Product, Split, two_sum};
 use super::number::{Number, cross, difference, dot, vector};
+use super::pair::{Pair, in_range, plain_cross, plain_dot, taxicab};
 use super::section::{End, Quadratic, Undecided, fine, nearest, precise, refined, sign};
 use crate::hit::Hit;
 use crate::interval::Interval;
@@ -26,6 +27,10 @@ const FIRST: f64 = 22.0;
 const SQUARED: f64 = 520.0;
 /// See [`SQUARED`].
 const RESIDUAL: f64 = 144.0 * U;
+/// |error of C from double-double| ≤ this·(r² + |C|).
+const NEAR_C: f64 = 64.0 * U * U;
+/// |error of b from double-double| ≤ u·|b| + this/4·(|f|₁ + r)·|d|₁.
+const NEAR_B: f64 = 128.0 * U * U;
 /// |f|₁ + r below this many radii keeps second-order terms within the constants.
 const FAR: f64 = (1u64 << 46) as f64;
 
@@ -49,51 +54,24 @@ pub fn intersect(ray: &Ray, center: DVec3, radius: f64, within: Interval) -> Opt
 /// The same bits for either [`Product`].
 #[inline(always)]
 fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Option<Hit> {
-    let (o, d) = (ray.origin, ray.direction);
     let cold = || refine(ray, center.x, center.y, center.z, r, within.min, within.max);
-    let ((fx, ex), (fy, ey), (fz, ez)) = (two_diff(o.x, center.x), two_diff(o.y, center.y), two_diff(o.z, center.z));
-    let a = d.x * d.x + d.y * d.y + d.z * d.z;
-    let b = fx * d.x + fy * d.y + fz * d.z;
-    let (wx, wy, wz) = (fy * d.z - fz * d.y, fz * d.x - fx * d.z, fx * d.y - fy * d.x);
-    let size = r + (fx.abs() + fy.abs() + fz.abs());
-    let ar = a * r;
-    let discriminant = ar * r - (wx * wx + wy * wy + wz * wz);
-    // NaN fails every one of these.
-    let ordinary = in_range(r, 225) & in_range(ar * r, 500) & (size < FAR * r);
-    if !(ordinary & (discriminant.abs() > DISCRIMINANT * ar * size)) {
+    let (f, d) = (Pair::difference(ray.origin, center), ray.direction);
+    let (value, error) = discriminant(f.hi, d, r);
+    if !(is_ordinary(f.hi, d, r) & (value.abs() > error)) {
         return cold();
     }
-    if discriminant < 0.0 {
+    if value < 0.0 {
         return None;
     }
-    let root = discriminant.sqrt();
-    let over_root = 1.0 / root;
-    let z = U * r * size * over_root;
-    let rest = z * (SQUARED * a * z * over_root + RESIDUAL);
-    // λ + lo after the step from λ₀; `slope` is the sign of the polynomial's slope at the root.
-    let step = |first: f64, slope: f64| {
-        let component = |f: f64, e: f64, d: f64| {
-            let (p, p_lo) = P::two_product(first, d);
-            let (h, h_lo) = two_sum(f, p);
-            (h, h_lo + (p_lo + e))
-        };
-        let (hx, lx) = component(fx, ex, d.x);
-        let (hy, ly) = component(fy, ey, d.y);
-        let (hz, lz) = component(fz, ez, d.z);
-        let ((x2, x2_lo), (y2, y2_lo)) = (P::two_product(hx, hx), P::two_product(hy, hy));
-        let ((z2, z2_lo), (r2, r2_lo)) = (P::two_product(hz, hz), P::two_product(r, r));
-        let ((s, s_lo), (t, t_lo)) = (two_sum(x2, y2), two_diff(z2, r2));
-        let (residual, residual_lo) = two_sum(s, t);
-        let cross = lx * (2.0 * hx + lx) + ly * (2.0 * hy + ly) + lz * (2.0 * hz + lz);
-        let low = (residual_lo + (s_lo + t_lo)) + ((x2_lo + y2_lo) + (z2_lo - r2_lo)) + cross;
-        two_sum(first, -slope * 0.5 * over_root * (residual + low))
-    };
+    let root = value.sqrt();
+    // The root at which the polynomial falls (it is entered), then the one at which it rises.
     for slope in [-1.0, 1.0] {
-        let first = (slope * root - b) / a;
+        let first = (slope * root - plain_dot(f.hi, d)) / plain_dot(d, d);
+        let (z, rest) = bounds(f.hi, d, r, root);
         if slope < 0.0 && first + FIRST * z <= within.min {
             continue;
         }
-        let (lambda, lo) = step(first, slope);
+        let (lambda, lo) = step::<P>(&f, d, r, root, slope, first);
         let error = (lo.abs() + rest) * (1.0 + 8.0 * U);
         let inside = (lambda - error > within.min) & (lambda + error < within.max);
         if inside & (rest <= 0.5 * U * lambda.abs()) {
@@ -105,9 +83,11 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
         if lambda - error > within.max {
             return None;
         }
-        // Next to the origin an ulp of 2⁻⁴⁰ of the largest coordinate is what counts; that is size/7 or more.
-        let near = size / (7.0 * (d.x.abs() + d.y.abs() + d.z.abs())) * (1.0 / (1u64 << 40) as f64);
-        if inside & (rest <= 0.5 * U * near) {
+        let (lambda, error) = next_to_origin(ray, center.x, center.y, center.z, r, slope);
+        if lambda + error < within.min {
+            continue;
+        }
+        if (lambda - error > within.min) & (lambda + error < within.max) {
             return Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 });
         }
         return cold();
@@ -115,11 +95,62 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
     None
 }
 
-/// 2⁻ᵉ ≤ x < 2ᵉ
+/// Whether nothing over- or underflows that counts; a NaN does.
 #[inline(always)]
-fn in_range(x: f64, e: u64) -> bool {
-    let least = (1023 - e) << 52;
-    x.to_bits().wrapping_sub(least) < (2 * e) << 52
+fn is_ordinary(f: DVec3, d: DVec3, r: f64) -> bool {
+    in_range(r, 225) & in_range(plain_dot(d, d) * r * r, 500) & (r + taxicab(f) < FAR * r)
+}
+
+/// D and a bound on its error.
+#[inline(always)]
+fn discriminant(f: DVec3, d: DVec3, r: f64) -> (f64, f64) {
+    let (w, ar) = (plain_cross(f, d), plain_dot(d, d) * r);
+    (ar * r - plain_dot(w, w), DISCRIMINANT * ar * (r + taxicab(f)))
+}
+
+/// z, and the bound on λ's error after the step.
+#[inline(always)]
+fn bounds(f: DVec3, d: DVec3, r: f64, root: f64) -> (f64, f64) {
+    let over = 1.0 / root;
+    let z = U * r * (r + taxicab(f)) * over;
+    (z, z * (SQUARED * plain_dot(d, d) * z * over + RESIDUAL))
+}
+
+/// λ + lo after one Newton step from `first`, with the slope at the root.
+#[inline(always)]
+fn step<P: Product>(f: &Pair, d: DVec3, r: f64, root: f64, slope: f64, first: f64) -> (f64, f64) {
+    let residual = f.moved::<P>(first, d).squared_less::<P>(r, 0.0);
+    two_sum(first, -slope * 0.5 * (1.0 / root) * residual)
+}
+
+/// λ and its error of a root next to the origin, as on a ray that starts on the sphere: C/(|b| + √(b² − AC)) with C and
+/// b in double-double. NaN where it is not, or not known to a part of the least ulp that is promised.
+#[cold]
+#[inline(never)]
+fn next_to_origin(ray: &Ray, x: f64, y: f64, z: f64, r: f64, slope: f64) -> (f64, f64) {
+    let center = DVec3::new(x, y, z);
+    cpu::dispatch(
+        #[inline(always)]
+        || small_root::<Fused>(ray, center, r, slope),
+        #[inline(always)]
+        || small_root::<Split>(ray, center, r, slope),
+    )
+}
+
+#[inline(always)]
+fn small_root<P: Product>(ray: &Ray, center: DVec3, r: f64, slope: f64) -> (f64, f64) {
+    let (f, d) = (Pair::difference(ray.origin, center), ray.direction);
+    let a = plain_dot(d, d);
+    let c = f.squared_less::<P>(r, 0.0);
+    let (b, b_lo) = f.dot_float::<P>(d);
+    let b = b + b_lo;
+    let over = 1.0 / (b.abs() + (b * b - a * c).sqrt());
+    let lambda = -slope * c * over;
+    let size = r + taxicab(f.hi);
+    let error = NEAR_C * (r * r + c.abs()) * over + lambda.abs() * (16.0 * U + NEAR_B * size * taxicab(d) * over);
+    let near = (slope * b > 0.0) & (4.0 * a * c.abs() < b * b);
+    let sharp = error <= 0.5 * U * fine(ray, center.abs().max_element().max(r));
+    if near & sharp { (lambda, error) } else { (f64::NAN, f64::NAN) }
 }
 
 /// Scalars, so that the caller's vectors stay in registers.
@@ -187,4 +218,80 @@ fn sharpen<N: Number>(ray: &Ray, center: DVec3, radius: f64, lambda: f64) -> Res
 fn locate<N: Number>(point: DVec3, center: DVec3, radius: f64) -> Result<Ordering, Undecided> {
     let f = difference::<N>(point, center);
     sign(&dot(&f, &f).minus(&N::exactly(radius).squared()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::search::{Rational, climb, cross3, dot3, exact, minus};
+    use super::*;
+
+    /// f = x₀..₂ over 2^(10·x₇), d = x₃..₅, r from |f × d|/|d| and x₆: from clear hits to grazing ones.
+    fn setting(x: &[f64]) -> Option<(DVec3, DVec3, DVec3, f64)> {
+        let (c, d) = (DVec3::new(x[8], x[9], x[10]), DVec3::new(x[3], x[4], x[5]));
+        let o = c + DVec3::new(x[0], x[1], x[2]) * 2f64.powf(10.0 * x[7]);
+        let r = (o - c).cross(d).length() / d.length() * (1.0 + x[6].abs().powi(6));
+        (is_ordinary(o - c, d, r)).then_some((o, c, d, r))
+    }
+
+    /// A, b, C, D exactly.
+    fn polynomial(o: DVec3, c: DVec3, d: DVec3, r: f64) -> [Rational; 4] {
+        let (f, d, r) = (minus(o, c), exact(d), Rational::try_from(r).unwrap());
+        let w = cross3(&f, &d);
+        let (a, r2) = (dot3(&d, &d), &r * &r);
+        [a.clone(), dot3(&f, &d), dot3(&f, &f) - &r2, a * r2 - dot3(&w, &w)]
+    }
+
+    #[test]
+    fn no_input_reaches_the_bounds() {
+        let worst = climb("sphere: D", 11, |x| {
+            let (o, c, d, r) = setting(x)?;
+            let (value, error) = discriminant(Pair::difference(o, c).hi, d, r);
+            let [.., exact] = polynomial(o, c, d, r);
+            Some(((exact - Rational::try_from(value).ok()?).to_f64().value() / error).abs())
+        });
+        assert!((0.02..1.0).contains(&worst));
+        for (name, after) in [("sphere: first λ", false), ("sphere: λ after the step", true)] {
+            let worst = climb(name, 11, |x| {
+                let (o, c, d, r) = setting(x)?;
+                let f = Pair::difference(o, c);
+                let (value, error) = discriminant(f.hi, d, r);
+                if value <= error {
+                    return None;
+                }
+                let slope = x[6].signum();
+                let root = value.sqrt();
+                let first = (slope * root - plain_dot(f.hi, d)) / plain_dot(d, d);
+                let (z, rest) = bounds(f.hi, d, r, root);
+                let [a, b, cc, _] = polynomial(o, c, d, r);
+                let (lambda, lo) = if after { step::<Split>(&f, d, r, root, slope, first) } else { (first, 0.0) };
+                let bound = if after { rest } else { FIRST * z };
+                if after && rest > 0.5 * U * lambda.abs() {
+                    return None;
+                }
+                let l = Rational::try_from(lambda).ok()? + Rational::try_from(lo).ok()?;
+                let off = ((&a * &l + &b + &b) * &l + cc) / (Rational::from(2) * (a * l + b));
+                Some((off.to_f64().value() / bound).abs())
+            });
+            assert!((0.005..1.0).contains(&worst), "{name}: {worst}");
+        }
+    }
+
+    #[test]
+    fn both_products_answer_with_the_same_bits() {
+        let mut seen = [0; 2];
+        super::super::search::each(20_000, 11, |x| {
+            let Some((o, c, d, r)) = setting(x) else { return };
+            let ray = Ray { origin: o, direction: d };
+            let answers = [fast::<Fused>(&ray, c, r, Interval::FORWARD), fast::<Split>(&ray, c, r, Interval::FORWARD)];
+            assert_eq!(answers[0], answers[1]);
+            seen[usize::from(answers[0].is_some())] += 1;
+            let tiers = [
+                decide::<super::super::bounded::Bounded<Fused>>(&ray, c, r, Interval::LINE),
+                decide::<super::super::bounded::Bounded<Split>>(&ray, c, r, Interval::LINE),
+            ];
+            assert_eq!(tiers[0].as_ref().ok(), tiers[1].as_ref().ok());
+        });
+        println!("{seen:?} misses and hits");
+        assert!(seen[0] > 1000 && seen[1] > 1000);
+    }
 }
