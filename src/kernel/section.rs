@@ -217,10 +217,15 @@ pub(super) fn fine(ray: &Ray, extent: f64) -> f64 {
     if fine < f64::INFINITY { fine } else { 0.0 }
 }
 
+/// What [`precise`] promises: exact arithmetic and the few operations after it reach 2⁻⁹⁸.
+const PRECISE: f64 = f64::from_bits((1023 - 94) << 52); // 2⁻⁹⁴
+
 /// Of two ends the λ nearest to `lambda`, to a hundred bits; undecided where this arithmetic knows less.
 pub(super) fn precise<N: Number>(ends: &[End<N>; 2], lambda: f64) -> Result<[f64; 2], Undecided> {
     let (enter, exit) = (ends[0].lambda(), ends[1].lambda());
-    if !enter.is_sharp(0.0) || !exit.is_sharp(0.0) {
+    // A NaN is not below it.
+    let known = |l: &Lambda| l.relative <= PRECISE;
+    if !known(&enter) || !known(&exit) {
         return Err(Undecided);
     }
     let at = Scaled::new(lambda, 0.0, 0);
