@@ -18,10 +18,10 @@ impl Wide {
                 for (lane, &child) in children[..count].iter().enumerate() {
                     let node = &binary.nodes[child as usize];
                     for axis in 0..3 {
-                        wide.planes[axis][lane] = node.min[axis];
-                        wide.planes[axis + 3][lane] = node.max[axis];
+                        wide.rows[axis][lane] = node.min[axis];
+                        wide.rows[axis + 3][lane] = node.max[axis];
                     }
-                    wide.children[lane] = if node.count > 0 {
+                    let word = if node.count > 0 {
                         // Numbered later, in the order of the items.
                         LEAF | node.first
                     } else {
@@ -29,10 +29,11 @@ impl Wide {
                         inner += 1;
                         first + inner - 1
                     };
+                    wide.set_child(lane, word);
                 }
                 for lane in (0..count).rev() {
-                    if wide.children[lane] & LEAF == 0 {
-                        work.push((children[lane], wide.children[lane]));
+                    if wide.child(lane) & LEAF == 0 {
+                        work.push((children[lane], wide.child(lane)));
                     }
                 }
                 nodes[to as usize] = wide;
@@ -49,7 +50,7 @@ fn number_leaves(nodes: &mut [WideNode], items: usize) {
     let is_leaf = |c: u32| c != NONE && c & LEAF != 0;
     let mut number = vec![0u32; items];
     for n in &*nodes {
-        for &c in n.children.iter().filter(|&&c| is_leaf(c)) {
+        for c in (0..8).map(|lane| n.child(lane)).filter(|&c| is_leaf(c)) {
             number[(c & !LEAF) as usize] = 1;
         }
     }
@@ -60,8 +61,11 @@ fn number_leaves(nodes: &mut [WideNode], items: usize) {
         count += starts;
     }
     for n in nodes {
-        for c in n.children.iter_mut().filter(|c| is_leaf(**c)) {
-            *c = LEAF | number[(*c & !LEAF) as usize];
+        for lane in 0..8 {
+            let c = n.child(lane);
+            if is_leaf(c) {
+                n.set_child(lane, LEAF | number[(c & !LEAF) as usize]);
+            }
         }
     }
 }

@@ -22,7 +22,7 @@ pub(crate) use traverse::{Any, Closest, any, closest};
 pub(crate) use wide::Wide;
 
 use crate::{Aabb, Interval, Ray};
-use fearless_simd::Simd;
+use fearless_simd::{Simd, dispatch};
 
 /// A tree over the boxes of objects numbered from zero.
 #[derive(Clone, Debug)]
@@ -58,13 +58,15 @@ impl Bvh {
     /// the λ that still matters. An object is visited at most once.
     #[inline]
     pub fn closest(&self, ray: &Ray, within: Interval, mut visit: impl FnMut(u32, f64) -> f64) {
-        if within.is_empty() || !ray.is_valid() {
-            return;
-        }
+        dispatch!(self.level.token(), simd => self.closest_with(simd, ray, within, &mut visit));
+    }
+
+    #[inline(always)]
+    fn closest_with<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, visit: &mut impl FnMut(u32, f64) -> f64) {
         let mut bound = within.max;
-        if let Some(local) = LocalRay::new(&self.tree.frame, ray, within) {
-            closest(self.level, &self.tree, &local, &mut Nearest { bvh: self, local: &local, bound, visit });
-        } else {
+        if let Some(local) = LocalRay::new(simd, &self.tree.frame, ray, within) {
+            closest(simd, &self.tree, &local, &mut Nearest { bvh: self, local: &local, bound, visit });
+        } else if !within.is_empty() && ray.is_valid() {
             // No place in the frame: every object.
             for &object in &self.objects {
                 bound = visit(object, bound);
@@ -75,12 +77,15 @@ impl Bvh {
     /// Whether `hits(object)` for any object whose box the ray meets inside `within`; asks until the first yes.
     #[inline]
     pub fn any(&self, ray: &Ray, within: Interval, mut hits: impl FnMut(u32) -> bool) -> bool {
-        if within.is_empty() || !ray.is_valid() {
-            return false;
-        }
-        match LocalRay::new(&self.tree.frame, ray, within) {
-            Some(local) => any(self.level, &self.tree, &local, &mut First { bvh: self, hits }),
-            None => self.objects.iter().any(|&o| hits(o)),
+        dispatch!(self.level.token(), simd => self.any_with(simd, ray, within, &mut hits))
+    }
+
+    #[inline(always)]
+    fn any_with<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, hits: &mut impl FnMut(u32) -> bool) -> bool {
+        if let Some(local) = LocalRay::new(simd, &self.tree.frame, ray, within) {
+            any(simd, &self.tree, &local, &mut First { bvh: self, hits })
+        } else {
+            !within.is_empty() && ray.is_valid() && self.objects.iter().any(|&o| hits(o))
         }
     }
 

@@ -3,10 +3,9 @@
 //! Everything down to the box test is inlined into one function per instruction level; the leaves' closures too, if
 //! they say so.
 
-use super::level::Level;
 use super::slab::LocalRay;
 use super::wide::{LEAF, NONE, Wide, WideNode};
-use fearless_simd::{Simd, dispatch, f32x8, prelude::*};
+use fearless_simd::{Simd, f32x8, prelude::*};
 
 /// What is left to visit: a child and the t where its box begins. Kept in a fixed array; what does not fit, which no
 /// sensible tree needs, goes to the heap.
@@ -18,7 +17,7 @@ struct Stack {
 }
 
 impl Stack {
-    const ROOM: usize = 64;
+    const ROOM: usize = 32;
 
     #[inline(always)]
     fn new() -> Self {
@@ -82,12 +81,12 @@ impl Stack {
 }
 
 #[inline(always)]
-fn row<S: Simd>(simd: S, node: &WideNode, row: usize) -> f32x8<S> {
-    node.planes[row].simd_into(simd)
+fn row<S: Simd>(simd: S, node: &WideNode, row: u32) -> f32x8<S> {
+    node.rows[row as usize & 7].simd_into(simd)
 }
 
 #[inline(always)]
-fn spread<S: Simd>(simd: S, v: &[f32; 3]) -> [f32x8<S>; 3] {
+fn spread<S: Simd>(simd: S, v: &[f32; 4]) -> [f32x8<S>; 3] {
     [f32x8::splat(simd, v[0]), f32x8::splat(simd, v[1]), f32x8::splat(simd, v[2])]
 }
 
@@ -114,9 +113,9 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     fn test(&self, simd: S, node: &WideNode, ray: &LocalRay, t_max: f32) -> (u32, f32x8<S>) {
         let [inv, near, far] = [&self.inv, &self.near_shift, &self.far_shift];
-        let (near_x, far_x) = (row(simd, node, ray.near[0]), row(simd, node, ray.far[0]));
-        let (near_y, far_y) = (row(simd, node, ray.near[1]), row(simd, node, ray.far[1]));
-        let (near_z, far_z) = (row(simd, node, ray.near[2]), row(simd, node, ray.far[2]));
+        let (near_x, far_x) = (row(simd, node, ray.planes[0]), row(simd, node, ray.planes[3]));
+        let (near_y, far_y) = (row(simd, node, ray.planes[1]), row(simd, node, ray.planes[4]));
+        let (near_z, far_z) = (row(simd, node, ray.planes[2]), row(simd, node, ray.planes[5]));
         let enter_x = near_x.mul_sub(inv[0], near[0]);
         let enter_y = near_y.mul_sub(inv[1], near[1]);
         let enter_z = near_z.mul_sub(inv[2], near[2]);
@@ -145,20 +144,16 @@ pub(crate) trait Any {
 
 /// Visits the leaves whose boxes the ray meets, nearest first.
 #[inline(always)]
-pub(crate) fn closest(level: Level, tree: &Wide, ray: &LocalRay, leaves: &mut impl Closest) {
-    dispatch!(level.token().0, simd => closest_in(simd, tree, ray, leaves));
-}
-
-#[inline(always)]
-fn closest_in<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut impl Closest) {
+pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut impl Closest) {
     let lanes = Lanes::new(simd, ray);
+    let nodes = &tree.nodes[..];
     let mut t_max = ray.t_max;
     let mut stack = Stack::new();
     let mut at = 0u32;
     loop {
         // Down to a leaf, or to nothing.
         while at & LEAF == 0 {
-            let node = &tree.nodes[at as usize];
+            let node = &nodes[at as usize];
             let (mut hits, enter) = lanes.test(simd, node, ray, t_max);
             if hits == 0 {
                 at = NONE;
@@ -168,7 +163,7 @@ fn closest_in<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut impl C
             let first = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
             if hits == 0 {
-                at = node.children[first];
+                at = node.child(first);
                 continue;
             }
             stack.reserve();
@@ -176,17 +171,17 @@ fn closest_in<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut impl C
             hits &= hits - 1;
             if hits == 0 {
                 let (a, b) = if enter[first] <= enter[second] { (first, second) } else { (second, first) };
-                stack.push(node.children[b], enter[b]);
-                at = node.children[a];
+                stack.push(node.child(b), enter[b]);
+                at = node.child(a);
                 continue;
             }
-            stack.push(node.children[first], enter[first]);
-            stack.push(node.children[second], enter[second]);
+            stack.push(node.child(first), enter[first]);
+            stack.push(node.child(second), enter[second]);
             let mut count = 2;
             while hits != 0 {
                 let i = hits.trailing_zeros() as usize & 7;
                 hits &= hits - 1;
-                stack.push(node.children[i], enter[i]);
+                stack.push(node.child(i), enter[i]);
                 count += 1;
             }
             stack.sort(count);
@@ -208,24 +203,20 @@ fn closest_in<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut impl C
 
 /// Visits the leaves whose boxes the ray meets, in the nodes' fixed order, until one holds a hit.
 #[inline(always)]
-pub(crate) fn any(level: Level, tree: &Wide, ray: &LocalRay, leaves: &mut impl Any) -> bool {
-    dispatch!(level.token().0, simd => any_in(simd, tree, ray, leaves))
-}
-
-#[inline(always)]
-fn any_in<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut impl Any) -> bool {
+pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut impl Any) -> bool {
     let lanes = Lanes::new(simd, ray);
+    let nodes = &tree.nodes[..];
     let mut stack = Stack::new();
     let mut at = 0u32;
     loop {
         if at & LEAF == 0 {
-            let node = &tree.nodes[at as usize];
+            let node = &nodes[at as usize];
             let (mut hits, _) = lanes.test(simd, node, ray, ray.t_max);
             stack.reserve();
             while hits != 0 {
                 let i = 31 - hits.leading_zeros() as usize;
                 hits &= !(1 << i);
-                stack.push(node.children[i & 7], 0.0);
+                stack.push(node.child(i), 0.0);
             }
         } else if at != NONE && leaves.leaf(simd, at & !LEAF) {
             return true;

@@ -3,33 +3,36 @@
 use super::frame::Frame;
 
 /// Eight children, 256 bytes, four cache lines.
+///
+/// Rows 0–2 are the least x, y, z of every child, 3–5 the greatest, [`CHILDREN`] what the child is, as the bits of a
+/// float. One array of a power of two of rows, so that a row number needs no check.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct WideNode {
-    /// Least x, y, z, then greatest x, y, z, of every child.
-    pub(crate) planes: [[f32; 8]; 6],
-    /// A node's number, or [`LEAF`] | a leaf's number, or [`NONE`].
-    pub(crate) children: [u32; 8],
-    pub(crate) spare: [u32; 8],
+    pub(crate) rows: [[f32; 8]; 8],
 }
 
+pub(crate) const CHILDREN: usize = 6;
+/// Marks a leaf's number among the children; others are nodes' numbers.
 pub(crate) const LEAF: u32 = 1 << 31;
+/// No child, in a lane that every ray misses.
 pub(crate) const NONE: u32 = u32::MAX;
 
 impl WideNode {
-    /// No children: boxes that every ray misses.
-    pub(crate) const EMPTY: Self = Self {
-        planes: [
-            [f32::INFINITY; 8],
-            [f32::INFINITY; 8],
-            [f32::INFINITY; 8],
-            [-f32::INFINITY; 8],
-            [-f32::INFINITY; 8],
-            [-f32::INFINITY; 8],
-        ],
-        children: [NONE; 8],
-        spare: [0; 8],
+    /// No children.
+    pub(crate) const EMPTY: Self = {
+        let (out, back) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
+        Self { rows: [out, out, out, back, back, back, [f32::from_bits(NONE); 8], [0.0; 8]] }
     };
+
+    #[inline(always)]
+    pub(crate) fn child(&self, lane: usize) -> u32 {
+        self.rows[CHILDREN][lane & 7].to_bits()
+    }
+
+    pub(crate) fn set_child(&mut self, lane: usize, child: u32) {
+        self.rows[CHILDREN][lane] = f32::from_bits(child);
+    }
 }
 
 /// A tree of wide nodes; the root is node 0.

@@ -116,8 +116,8 @@ pub(super) fn build(positions: &[DVec3], triangles: &[[u32; 3]]) -> (Wide, Vec<L
 /// The ray as the filter wants it: in f32, with the margins' constants.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probe {
-    origin: [f32; 3],
-    direction: [f32; 3],
+    origin: [f32; 4],
+    direction: [f32; 4],
     /// Margin of the edge functions: size·(`edge` + size·`edge2`).
     edge: f32,
     edge2: f32,
@@ -134,21 +134,19 @@ const UNDERFLOW: f32 = 1e-36;
 impl Probe {
     #[inline(always)]
     pub(super) fn new(ray: &LocalRay) -> Self {
-        const E: f64 = 1.0 / 16_777_216.0; // 2⁻²⁴
-        let size = ray.origin.abs().max_element();
-        let d = ray.direction.length();
-        // |v₀ − o| and, as if it were part of it, the origin's own error.
-        let r = ray.origin.length() + 1.733 + ray.origin_error / E;
-        let reach = (1.0 + size) * (1.0 + 1e-6) + ray.origin_error;
-        let up = 1.0 + 1e-6;
+        const E: f32 = 1.0 / 16_777_216.0; // 2⁻²⁴
+        // |direction| < 2√3 and |v₀ − o| ≤ √3(1 + size), with the origin's own error as if it were part of that.
+        let d = 3.4642;
+        let reach = (1.0 + ray.size) * (1.0 + 1e-5) + ray.origin_error * (1.0 / E);
+        let r = 1.7321 * reach;
         Self {
-            origin: ray.origin.as_vec3().to_array(),
-            direction: ray.direction.as_vec3().to_array(),
-            edge: (13.0 * E * d * r * up) as f32,
-            edge2: (3.0 * E * d * up) as f32,
-            depth: (3.0 * E * (r + reach * d) * up) as f32,
-            t_min: ray.t_min.max(-(reach as f32) * 1.000_001),
-            reach: reach as f32 * 1.000_001,
+            origin: ray.origin,
+            direction: ray.direction,
+            edge: 13.0 * E * d * r,
+            edge2: 3.1 * E * d,
+            depth: 3.1 * E * (r + reach * d),
+            t_min: if ray.t_min > -reach { ray.t_min } else { -reach },
+            reach,
         }
     }
 
@@ -198,7 +196,7 @@ fn splat<S: Simd>(simd: S, x: f32) -> f32x8<S> {
 }
 
 #[inline(always)]
-fn spread<S: Simd>(simd: S, v: &[f32; 3]) -> Vec8<S> {
+fn spread<S: Simd>(simd: S, v: &[f32; 4]) -> Vec8<S> {
     [splat(simd, v[0]), splat(simd, v[1]), splat(simd, v[2])]
 }
 

@@ -6,40 +6,45 @@ use crate::bvh::{self, LocalRay};
 use crate::kernel::eft::{Fused, Split};
 use crate::kernel::triangle;
 use crate::{Hit, Interval, Ray};
-use fearless_simd::{Level, Simd};
+use fearless_simd::{Level, Simd, dispatch};
 use glam::DVec3;
 use std::cmp::Ordering;
 
 /// The nearest hit; the lowest triangle of those met at exactly the same λ.
-#[inline]
 pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
-    if within.is_empty() || !ray.is_valid() {
-        return None;
-    }
-    let Some(local) = LocalRay::new(mesh.frame(), ray, within) else { return closest_of_all(mesh, ray, within) };
+    dispatch!(mesh.level.token(), simd => closest_with(simd, mesh, ray, within))
+}
+
+#[inline(always)]
+fn closest_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
+    let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else { return closest_of_all(mesh, ray, within) };
     let mut nearest =
         Nearest { mesh, ray, local: &local, probe: Probe::new(&local), within, t_max: local.t_max, best: None };
-    bvh::closest(mesh.level, &mesh.tree, &local, &mut nearest);
+    bvh::closest(simd, &mesh.tree, &local, &mut nearest);
     nearest.best
 }
 
 /// Whether anything is hit.
-#[inline]
 pub(super) fn any(mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
-    if within.is_empty() || !ray.is_valid() {
-        return false;
-    }
-    let Some(local) = LocalRay::new(mesh.frame(), ray, within) else {
+    dispatch!(mesh.level.token(), simd => any_with(simd, mesh, ray, within))
+}
+
+#[inline(always)]
+fn any_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
+    let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else {
         return closest_of_all(mesh, ray, within).is_some();
     };
     let mut first = First { mesh, ray, probe: Probe::new(&local), t_max: local.t_max, within };
-    bvh::any(mesh.level, &mesh.tree, &local, &mut first)
+    bvh::any(simd, &mesh.tree, &local, &mut first)
 }
 
 /// A ray that has no place in the tree's frame.
 #[cold]
 #[inline(never)]
 fn closest_of_all(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
+    if within.is_empty() || !ray.is_valid() {
+        return None;
+    }
     (0..mesh.triangles.len() as u32).fold(None, |best, part| {
         let hit = triangle::intersect(ray, &mesh.vertices(part), within);
         match hit {
@@ -90,8 +95,17 @@ struct Nearest<'a> {
 }
 
 impl Nearest<'_> {
+    /// Out of line, so that the walk keeps its registers.
+    #[inline(never)]
+    fn candidates<S: Simd>(&mut self, simd: S, leaf: &Leaf, lanes: u32) {
+        simd.vectorize(
+            #[inline(always)]
+            || self.confirm_all(simd, leaf, lanes),
+        );
+    }
+
     #[inline(always)]
-    fn candidates<S: Simd>(&mut self, simd: S, leaf: &Leaf, mut lanes: u32) {
+    fn confirm_all<S: Simd>(&mut self, simd: S, leaf: &Leaf, mut lanes: u32) {
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize & 7;
             lanes &= lanes - 1;
@@ -137,14 +151,26 @@ impl bvh::Any for First<'_> {
     #[inline(always)]
     fn leaf<S: Simd>(&mut self, simd: S, leaf: u32) -> bool {
         let leaf = &self.mesh.leaves[leaf as usize];
-        let mut lanes = self.probe.test(simd, leaf, self.t_max);
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize & 7;
-            lanes &= lanes - 1;
-            if confirm(simd, self.ray, &leaf.vertices(lane, self.mesh), self.within).is_some() {
-                return true;
-            }
-        }
-        false
+        let lanes = self.probe.test(simd, leaf, self.t_max);
+        lanes != 0 && self.candidates(simd, leaf, lanes)
+    }
+}
+
+impl First<'_> {
+    #[inline(never)]
+    fn candidates<S: Simd>(&self, simd: S, leaf: &Leaf, mut lanes: u32) -> bool {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                while lanes != 0 {
+                    let lane = lanes.trailing_zeros() as usize & 7;
+                    lanes &= lanes - 1;
+                    if confirm(simd, self.ray, &leaf.vertices(lane, self.mesh), self.within).is_some() {
+                        return true;
+                    }
+                }
+                false
+            },
+        )
     }
 }
