@@ -8,10 +8,13 @@ impl Wide {
     pub(crate) fn collapse(binary: &Binary) -> Self {
         let mut nodes = vec![WideNode::EMPTY];
         if !binary.nodes.is_empty() {
+            let sizes = binary.sizes();
             // (binary node, wide node to fill)
             let mut work = vec![(0u32, 0u32)];
             while let Some((from, to)) = work.pop() {
-                let (children, count) = open(&binary.nodes, from);
+                let (mut children, count) = open(&binary.nodes, from);
+                // Any-hit queries take the lanes in turn: where there is least to test first.
+                children[..count].sort_by_key(|&c| sizes[c as usize]);
                 let mut wide = WideNode::EMPTY;
                 let first = nodes.len() as u32;
                 let mut inner = 0;
@@ -98,6 +101,19 @@ fn open(nodes: &[Node], from: u32) -> ([u32; 8], usize) {
 }
 
 impl Binary {
+    /// The number of items below each node.
+    fn sizes(&self) -> Vec<u32> {
+        let mut sizes = vec![0; self.nodes.len()];
+        // Children lie behind their parents.
+        for (i, node) in self.nodes.iter().enumerate().rev() {
+            sizes[i] = match node {
+                Node { count: 0, first, .. } if *first as usize > i => sizes[i + 1] + sizes[*first as usize],
+                node => node.count,
+            };
+        }
+        sizes
+    }
+
     /// The objects in the order of the leaves.
     pub(crate) fn order(&self) -> Vec<u32> {
         self.items.iter().map(|i| i.index).collect()

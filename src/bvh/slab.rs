@@ -118,7 +118,7 @@ impl LocalRay {
             stretch: power(k),
             advance,
         };
-        local.t_min = -local.upper_of(-within.min, -advance);
+        local.t_min = local.lower(within.min);
         local.t_max = local.upper(within.max);
         Some(local)
     }
@@ -127,6 +127,12 @@ impl LocalRay {
     #[inline(always)]
     pub(crate) fn upper(&self, lambda: f64) -> f32 {
         self.upper_of(lambda, self.advance)
+    }
+
+    /// Not above the t of `lambda`.
+    #[inline(always)]
+    pub(crate) fn lower(&self, lambda: f64) -> f32 {
+        -self.upper_of(-lambda, -self.advance)
     }
 
     /// Not below λ·stretch − advance. One addition covers the roundings of both precisions; what matters near the tree

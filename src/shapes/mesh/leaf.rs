@@ -128,13 +128,15 @@ pub(super) struct Probe {
     reach: f32,
 }
 
+/// The unit roundoff of f32, 2⁻²⁴.
+const E: f32 = f32::EPSILON / 2.0;
+
 /// What underflow may add to any of the filter's sums.
 const UNDERFLOW: f32 = 1e-36;
 
 impl Probe {
     #[inline(always)]
     pub(super) fn new(ray: &LocalRay) -> Self {
-        const E: f32 = 1.0 / 16_777_216.0; // 2⁻²⁴
         // |direction| < 2√3 and |v₀ − o| ≤ √3(1 + size), with the origin's own error as if it were part of that.
         let d = 3.4642;
         let reach = (1.0 + ray.size) * (1.0 + 1e-5) + ray.origin_error * (1.0 / E);
@@ -156,9 +158,9 @@ impl Probe {
         if t_max < self.reach { t_max } else { self.reach }
     }
 
-    /// The lanes of `leaf` whose triangles may be met between `t_min` and `t_max`.
+    /// Which triangles of `leaf` may be met between `t_min` and `t_max`, and what is known of them.
     #[inline(always)]
-    pub(super) fn test<S: Simd>(&self, simd: S, leaf: &Leaf, t_max: f32) -> u32 {
+    pub(super) fn test<S: Simd>(&self, simd: S, leaf: &Leaf, t_max: f32) -> Outcome<S> {
         let (v0, e1, e2) = (load(simd, &leaf.v0), load(simd, &leaf.e1), load(simd, &leaf.e2));
         let (o, d) = (spread(simd, &self.origin), spread(simd, &self.direction));
         let size: f32x8<S> = leaf.size.simd_into(simd);
@@ -176,6 +178,8 @@ impl Probe {
         let least = u.min(v.min(w));
         let most = u.max(v.max(w));
         let outside = least.simd_lt(-margin) & most.simd_gt(margin);
+        // Certainly through: all three above zero, or all below.
+        let through = least.simd_gt(margin) | most.simd_lt(-margin);
 
         // The sign of det goes to t's numerator; where it is uncertain the margin is wide enough for both.
         let t = dot(n, c);
@@ -184,7 +188,52 @@ impl Probe {
         let signed = t * splat(simd, 1.0).copysign(det);
         let beyond = (signed - size_of_det * splat(simd, self.last(t_max))).simd_gt(depth);
         let before = (signed - size_of_det * splat(simd, self.t_min)).simd_lt(-depth);
-        !((outside | beyond | before).to_bitmask() as u32) & 0xff
+        Outcome {
+            maybe: !((outside | beyond | before).to_bitmask() as u32) & 0xff,
+            through: through.to_bitmask() as u32,
+            numerator: signed,
+            denominator: size_of_det,
+            margin: depth,
+        }
+    }
+}
+
+/// What the filter says of a leaf.
+pub(super) struct Outcome<S: Simd> {
+    /// The lanes that are not certain to miss.
+    pub(super) maybe: u32,
+    /// The lanes whose triangles' insides the ray's line passes through, for certain.
+    pub(super) through: u32,
+    /// |numerator − t·denominator| ≤ margin at the exact t.
+    pub(super) numerator: f32x8<S>,
+    pub(super) denominator: f32x8<S>,
+    pub(super) margin: f32x8<S>,
+}
+
+impl<S: Simd> Outcome<S> {
+    /// As numbers.
+    #[inline(always)]
+    pub(super) fn depths(&self) -> Depths {
+        Depths { numerator: self.numerator.into(), denominator: self.denominator.into(), margin: self.margin.into() }
+    }
+}
+
+/// t of a leaf's triangles, by lane.
+#[derive(Debug)]
+pub(super) struct Depths {
+    numerator: [f32; 8],
+    denominator: [f32; 8],
+    margin: [f32; 8],
+}
+
+impl Depths {
+    /// The exact t is between these; NaN if nothing is known.
+    #[inline(always)]
+    pub(super) fn interval(&self, lane: usize) -> (f32, f32) {
+        let (n, d) = (self.numerator[lane & 7], self.denominator[lane & 7]);
+        // And the two roundings of each end.
+        let m = self.margin[lane & 7] + n.abs() * (4.0 * E);
+        ((n - m) / d, (n + m) / d)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Closest and any hit of a mesh.
 
 use super::Mesh;
-use super::leaf::{Leaf, Probe};
+use super::leaf::{Depths, Leaf, Probe};
 use crate::bvh::{self, LocalRay};
 use crate::kernel::eft::{Fused, Split};
 use crate::kernel::triangle;
@@ -18,9 +18,22 @@ pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
 #[inline(always)]
 fn closest_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
     let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else { return closest_of_all(mesh, ray, within) };
-    let mut nearest =
-        Nearest { mesh, ray, local: &local, probe: Probe::new(&local), within, t_max: local.t_max, best: None };
+    let mut nearest = Nearest {
+        mesh,
+        ray,
+        within,
+        local: &local,
+        probe: Probe::new(&local),
+        sure: Sure::new(&local, within),
+        t_max: local.t_max,
+        passed: [Passed { leaf: 0, lane: 0, t: 0.0 }; MOST_PASSED],
+        count: 0,
+        best: None,
+    };
     bvh::closest(simd, &mesh.tree, &local, &mut nearest);
+    if nearest.count > 0 {
+        nearest.decide(simd);
+    }
     nearest.best
 }
 
@@ -34,7 +47,8 @@ fn any_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> bool 
     let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else {
         return closest_of_all(mesh, ray, within).is_some();
     };
-    let mut first = First { mesh, ray, probe: Probe::new(&local), t_max: local.t_max, within };
+    let sure = Sure::new(&local, within);
+    let mut first = First { mesh, ray, probe: Probe::new(&local), sure, t_max: local.t_max, within };
     bvh::any(simd, &mesh.tree, &local, &mut first)
 }
 
@@ -84,65 +98,127 @@ fn confirm<S: Simd>(simd: S, ray: &Ray, vertices: &[DVec3; 3], within: Interval)
     }
 }
 
+/// What is certainly inside the interval: limits of t rounded inward.
+#[derive(Clone, Copy)]
+struct Sure {
+    min: f32,
+    max: f32,
+}
+
+impl Sure {
+    #[inline(always)]
+    fn new(local: &LocalRay, within: Interval) -> Self {
+        Self { min: local.upper(within.min), max: local.lower(within.max) }
+    }
+
+    /// Whether a t between these is inside for certain; not if one is NaN.
+    #[inline(always)]
+    fn holds(&self, (low, high): (f32, f32)) -> bool {
+        (low > self.min) & (high < self.max)
+    }
+}
+
+/// A triangle that is certainly hit, at this t or later.
+#[derive(Clone, Copy)]
+struct Passed {
+    leaf: u32,
+    lane: u32,
+    t: f32,
+}
+
+const MOST_PASSED: usize = 4;
+
+/// The walk to the nearest hit. Triangles that the filter is certain of only shorten the ray; which of them is the
+/// nearest, and λ, is settled in f64 when the walk has ended and few are left.
 struct Nearest<'a> {
     mesh: &'a Mesh,
     ray: &'a Ray,
+    within: Interval,
     local: &'a LocalRay,
     probe: Probe,
-    within: Interval,
+    sure: Sure,
     t_max: f32,
+    passed: [Passed; MOST_PASSED],
+    count: usize,
     best: Option<Hit>,
 }
 
 impl Nearest<'_> {
     /// Out of line, so that the walk keeps its registers.
     #[inline(never)]
-    fn candidates<S: Simd>(&mut self, simd: S, leaf: &Leaf, lanes: u32) {
-        simd.vectorize(
-            #[inline(always)]
-            || self.confirm_all(simd, leaf, lanes),
-        );
+    fn candidates<S: Simd>(&mut self, simd: S, leaf: u32, mut lanes: u32, through: u32, depths: &Depths) {
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros();
+            lanes &= lanes - 1;
+            // Elsewhere the sign of the denominator is not known, and the depths mean nothing.
+            let certain = through >> lane & 1 == 1;
+            let (low, high) = depths.interval(lane as usize);
+            if certain && low > self.t_max {
+                continue;
+            }
+            if !(certain && self.sure.holds((low, high))) {
+                self.confirm(simd, leaf, lane);
+                continue;
+            }
+            if high < self.t_max {
+                self.t_max = high;
+            }
+            if self.count == MOST_PASSED {
+                self.decide(simd);
+            }
+            self.passed[self.count % MOST_PASSED] = Passed { leaf, lane, t: low };
+            self.count += 1;
+        }
     }
 
-    #[inline(always)]
-    fn confirm_all<S: Simd>(&mut self, simd: S, leaf: &Leaf, mut lanes: u32) {
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize & 7;
-            lanes &= lanes - 1;
-            let vertices = leaf.vertices(lane, self.mesh);
-            if let Some(hit) = confirm(simd, self.ray, &vertices, self.within) {
-                let hit = Hit { part: leaf.number(lane), ..hit };
-                self.best = Some(nearer(self.mesh, self.ray, self.best, hit));
+    /// Decides the triangles that are still in question.
+    #[inline(never)]
+    fn decide<S: Simd>(&mut self, simd: S) {
+        for i in 0..std::mem::take(&mut self.count) {
+            let Passed { leaf, lane, t } = self.passed[i % MOST_PASSED];
+            if t <= self.t_max {
+                self.confirm(simd, leaf, lane);
             }
         }
-        if let Some(best) = self.best {
-            let bound = best.lambda + best.error;
-            // Open intervals: what lies exactly at the best λ still matters.
-            let bound = bound + 2.0 * f64::EPSILON * bound.abs() + f64::MIN_POSITIVE;
-            if bound < self.within.max {
-                self.within.max = bound;
-                self.t_max = self.local.upper(bound);
-            }
-        }
+    }
+
+    #[inline(never)]
+    fn confirm<S: Simd>(&mut self, simd: S, leaf: u32, lane: u32) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let leaf = &self.mesh.leaves[leaf as usize];
+                let vertices = leaf.vertices(lane as usize & 7, self.mesh);
+                let Some(hit) = confirm(simd, self.ray, &vertices, self.within) else { return };
+                let hit = Hit { part: leaf.number(lane as usize & 7), ..hit };
+                let best = nearer(self.mesh, self.ray, self.best, hit);
+                self.best = Some(best);
+                let t = self.local.upper(best.lambda + best.error);
+                if t < self.t_max {
+                    self.t_max = t;
+                }
+            },
+        );
     }
 }
 
 impl bvh::Closest for Nearest<'_> {
     #[inline(always)]
     fn leaf<S: Simd>(&mut self, simd: S, leaf: u32) -> f32 {
-        let leaf = &self.mesh.leaves[leaf as usize];
-        let lanes = self.probe.test(simd, leaf, self.t_max);
-        if lanes != 0 {
-            self.candidates(simd, leaf, lanes);
+        let outcome = self.probe.test(simd, &self.mesh.leaves[leaf as usize], self.t_max);
+        if outcome.maybe != 0 {
+            self.candidates(simd, leaf, outcome.maybe, outcome.through, &outcome.depths());
         }
         self.t_max
     }
 }
 
+/// The walk to any hit: the filter's certainty is enough.
 struct First<'a> {
     mesh: &'a Mesh,
     ray: &'a Ray,
     probe: Probe,
+    sure: Sure,
     t_max: f32,
     within: Interval,
 }
@@ -151,26 +227,24 @@ impl bvh::Any for First<'_> {
     #[inline(always)]
     fn leaf<S: Simd>(&mut self, simd: S, leaf: u32) -> bool {
         let leaf = &self.mesh.leaves[leaf as usize];
-        let lanes = self.probe.test(simd, leaf, self.t_max);
-        lanes != 0 && self.candidates(simd, leaf, lanes)
+        let outcome = self.probe.test(simd, leaf, self.t_max);
+        outcome.maybe != 0 && self.candidates(simd, leaf, outcome.maybe, outcome.through, &outcome.depths())
     }
 }
 
 impl First<'_> {
     #[inline(never)]
-    fn candidates<S: Simd>(&self, simd: S, leaf: &Leaf, mut lanes: u32) -> bool {
+    fn candidates<S: Simd>(&self, simd: S, leaf: &Leaf, lanes: u32, through: u32, depths: &Depths) -> bool {
+        let each = |lanes: u32| (0..8).filter(move |lane| lanes >> lane & 1 == 1);
+        each(lanes & through).any(|lane| self.sure.holds(depths.interval(lane)))
+            || each(lanes).any(|lane| self.confirm(simd, leaf, lane))
+    }
+
+    #[inline(never)]
+    fn confirm<S: Simd>(&self, simd: S, leaf: &Leaf, lane: usize) -> bool {
         simd.vectorize(
             #[inline(always)]
-            || {
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros() as usize & 7;
-                    lanes &= lanes - 1;
-                    if confirm(simd, self.ray, &leaf.vertices(lane, self.mesh), self.within).is_some() {
-                        return true;
-                    }
-                }
-                false
-            },
+            || confirm(simd, self.ray, &leaf.vertices(lane & 7, self.mesh), self.within).is_some(),
         )
     }
 }
