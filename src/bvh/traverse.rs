@@ -7,13 +7,14 @@ use super::slab::LocalRay;
 use super::wide::{LEAF, NONE, Wide, WideNode};
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-/// What is left to visit: a child and the t where its box begins. Kept in a fixed array; what does not fit, which no
-/// sensible tree needs, goes to the heap.
+/// What is left to visit: children, each with the t where its box begins. Kept in a fixed array; what does not fit,
+/// which no sensible tree needs, goes to the heap.
 struct Stack {
-    children: [u32; Stack::ROOM],
-    ts: [f32; Stack::ROOM],
+    /// t's bits above the child's. As integers they sort as t does, which is ≥ 0 in all but odd intervals; there the
+    /// order is worse and nothing else.
+    entries: [u64; Stack::ROOM],
     len: usize,
-    spilled: Vec<(u32, f32)>,
+    spilled: Vec<u64>,
 }
 
 impl Stack {
@@ -21,7 +22,12 @@ impl Stack {
 
     #[inline(always)]
     fn new() -> Self {
-        Self { children: [0; Self::ROOM], ts: [0.0; Self::ROOM], len: 0, spilled: Vec::new() }
+        Self { entries: [0; Self::ROOM], len: 0, spilled: Vec::new() }
+    }
+
+    #[inline(always)]
+    fn entry(child: u32, t: f32) -> u64 {
+        u64::from(t.to_bits()) << 32 | u64::from(child)
     }
 
     /// Room for eight more.
@@ -35,48 +41,40 @@ impl Stack {
     #[cold]
     #[inline(never)]
     fn spill(&mut self) {
-        self.spilled.extend(self.children.iter().copied().zip(self.ts).take(self.len));
+        self.spilled.extend_from_slice(&self.entries[..self.len]);
         self.len = 0;
     }
 
     #[inline(always)]
-    fn push(&mut self, child: u32, t: f32) {
-        let at = self.len & (Self::ROOM - 1);
-        self.children[at] = child;
-        self.ts[at] = t;
+    fn push(&mut self, entry: u64) {
+        self.entries[self.len & (Self::ROOM - 1)] = entry;
+        self.len += 1;
+    }
+
+    /// Pushes below all of the last `count` that are nearer.
+    #[inline(always)]
+    fn insert(&mut self, entry: u64, count: usize) {
+        let mut at = self.len;
+        while at > self.len - count && self.entries[(at - 1) & (Self::ROOM - 1)] < entry {
+            self.entries[at & (Self::ROOM - 1)] = self.entries[(at - 1) & (Self::ROOM - 1)];
+            at -= 1;
+        }
+        self.entries[at & (Self::ROOM - 1)] = entry;
         self.len += 1;
     }
 
     #[inline(always)]
     fn pop(&mut self) -> Option<(u32, f32)> {
-        if self.len == 0 {
-            return self.unspill();
-        }
-        self.len -= 1;
-        let at = self.len & (Self::ROOM - 1);
-        Some((self.children[at], self.ts[at]))
-    }
-
-    #[inline(always)]
-    fn unspill(&mut self) -> Option<(u32, f32)> {
-        if self.spilled.is_empty() { None } else { self.spilled.pop() }
-    }
-
-    /// Sorts the last `count`, the nearest to the top.
-    #[inline(always)]
-    fn sort(&mut self, count: usize) {
-        let base = self.len - count;
-        for i in base + 1..self.len {
-            let (child, t) = (self.children[i & (Self::ROOM - 1)], self.ts[i & (Self::ROOM - 1)]);
-            let mut j = i;
-            while j > base && self.ts[(j - 1) & (Self::ROOM - 1)] < t {
-                self.children[j & (Self::ROOM - 1)] = self.children[(j - 1) & (Self::ROOM - 1)];
-                self.ts[j & (Self::ROOM - 1)] = self.ts[(j - 1) & (Self::ROOM - 1)];
-                j -= 1;
+        let entry = if self.len == 0 {
+            if self.spilled.is_empty() {
+                return None;
             }
-            self.children[j & (Self::ROOM - 1)] = child;
-            self.ts[j & (Self::ROOM - 1)] = t;
-        }
+            self.spilled.pop()?
+        } else {
+            self.len -= 1;
+            self.entries[self.len & (Self::ROOM - 1)]
+        };
+        Some((entry as u32, f32::from_bits((entry >> 32) as u32)))
     }
 }
 
@@ -169,22 +167,22 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mu
             stack.reserve();
             let second = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
+            let (a, b) =
+                (Stack::entry(node.child(first), enter[first]), Stack::entry(node.child(second), enter[second]));
+            let (nearer, farther) = if a < b { (a, b) } else { (b, a) };
+            stack.push(farther);
             if hits == 0 {
-                let (a, b) = if enter[first] <= enter[second] { (first, second) } else { (second, first) };
-                stack.push(node.child(b), enter[b]);
-                at = node.child(a);
+                at = nearer as u32;
                 continue;
             }
-            stack.push(node.child(first), enter[first]);
-            stack.push(node.child(second), enter[second]);
+            stack.push(nearer);
             let mut count = 2;
             while hits != 0 {
                 let i = hits.trailing_zeros() as usize & 7;
                 hits &= hits - 1;
-                stack.push(node.child(i), enter[i]);
+                stack.insert(Stack::entry(node.child(i), enter[i]), count);
                 count += 1;
             }
-            stack.sort(count);
             let Some((child, _)) = stack.pop() else { return };
             at = child;
         }
@@ -216,7 +214,7 @@ pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut im
             while hits != 0 {
                 let i = 31 - hits.leading_zeros() as usize;
                 hits &= !(1 << i);
-                stack.push(node.child(i), 0.0);
+                stack.push(u64::from(node.child(i)));
             }
         } else if at != NONE && leaves.leaf(simd, at & !LEAF) {
             return true;
