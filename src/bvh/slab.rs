@@ -56,7 +56,7 @@ const PLANES: [[u32; 8]; 8] = {
 /// Steeper slopes are taken for this one. A slab is then wider than the ray's stretch near the tree: §10.
 const STEEPEST: f32 = 1_099_511_627_776.0; // 2⁴⁰
 
-/// Margin of a box test, relative to 1 + |origin|: eight roundings of f32 (6.1 are needed: §10).
+/// Margin of a box test, relative to 1 + |origin|: eight roundings of f32 (six are needed: §10).
 const SLAB: f32 = 8.0 / 16_777_216.0;
 
 /// Slack of a limit at or near zero. Nothing in a tree of width 1 is that small, and products with it stay clear of the
@@ -86,10 +86,8 @@ impl LocalRay {
             (origin, advance) = approach(start, direction);
             size = largest(origin);
         }
-        // Zero unless something is NaN or infinite, or as good as.
         let sum = direction.element_sum() + origin.element_sum();
-        let odd = sum - sum;
-        let sound = in_range & (reach <= FARTHEST) & (size <= FARTHEST) & (odd == 0.0) & (within.min < within.max);
+        let sound = in_range & (reach <= FARTHEST) & (size <= FARTHEST) & sum.is_finite() & (within.min < within.max);
         if !sound {
             return None;
         }

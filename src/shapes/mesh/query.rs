@@ -113,7 +113,7 @@ impl Sure {
 
     /// Whether a t between these is inside for certain; not if one is NaN.
     #[inline(always)]
-    fn holds(&self, (low, high): (f32, f32)) -> bool {
+    fn holds(self, (low, high): (f32, f32)) -> bool {
         (low > self.min) & (high < self.max)
     }
 }
