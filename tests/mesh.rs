@@ -284,7 +284,7 @@ fn t_junctions_crack_only_where_they_really_do() {
     let (mut met, mut cracked, mut through) = (0, 0, 0);
     for _ in 0..2000 {
         // 20-bit coordinates: the middle is a float. Then a third of the way, which is not.
-        let coarse = |v: DVec3| (v * 1048576.0).round() / 1048576.0;
+        let coarse = |v: DVec3| (v * 1_048_576.0).round() / 1_048_576.0;
         let (a, b) = (coarse(random.in_cube()), coarse(random.in_cube()));
         let whole = t_junction(0.5 * (a + b), a, b);
         let third = a + (b - a) / 3.0;
