@@ -1,0 +1,232 @@
+//! What follows a hit: its point, its normal, and the ray that leaves it.
+
+use crate::kernels::{Answer, Entry, Function, Origin};
+use crate::support::big::{Big, Big3};
+use crate::support::cases::{Case, Kernel, Solid};
+use crate::support::measure;
+use crate::support::oracle::{self, WALL};
+use crate::support::rng::Rng;
+use crate::table;
+use truehit::glam::DVec3;
+use truehit::{Hit, Interval, Ray, Shape, Surface};
+
+/// One way to answer, on all families of one shape.
+pub struct SurfaceRow {
+    pub kernel: Kernel,
+    pub name: &'static str,
+    /// Distance of the point from the surface in ulps of the largest coordinate, ascending.
+    pub points: Vec<f64>,
+    /// Points farther off than their bound, where there is one.
+    pub violations: Option<usize>,
+    /// Angle to the exact normal, in units of 2⁻⁵³ rad, ascending.
+    pub normals: Vec<f64>,
+    pub spawned: usize,
+    pub rehits: usize,
+}
+
+/// The shapes whose points and normals are looked at.
+const SHAPES: [Kernel; 5] = [Kernel::Plane, Kernel::Triangle, Kernel::Sphere, Kernel::Cylinder, Kernel::Cone];
+
+pub fn all(cases: usize, wanted: &impl Fn(Kernel) -> bool) -> Vec<SurfaceRow> {
+    let entries = table::all();
+    let mut rows = Vec::new();
+    for kernel in SHAPES.into_iter().filter(|k| wanted(*k)) {
+        let families: Vec<_> = crate::support::families::all().into_iter().filter(|f| f.kernel == kernel).collect();
+        let cases: Vec<Case> = families.iter().flat_map(|f| (0..cases.div_ceil(4)).map(|i| f.case(i))).collect();
+        for name in ["Möller–Trumbore f64", "slide formula f64", "textbook f64", "truehit"] {
+            let entry = entries.iter().find(|e| e.kernel == kernel && e.name == name);
+            rows.extend(entry.map(|e| row(e, &cases)));
+        }
+    }
+    rows
+}
+
+fn row(entry: &Entry, cases: &[Case]) -> SurfaceRow {
+    let shipped = entry.origin == Origin::Shipped;
+    let mut out = SurfaceRow {
+        kernel: entry.kernel,
+        name: entry.name,
+        points: Vec::new(),
+        violations: shipped.then_some(0),
+        normals: Vec::new(),
+        spawned: 0,
+        rehits: 0,
+    };
+    for (i, case) in cases.iter().enumerate() {
+        let size = largest(&case.solid).max(case.ray.origin.abs().max_element());
+        // Figures in floats: the ends of their range are the other table's.
+        let tame = |x: f64| x == 0.0 || (1e-60..1e60).contains(&x.abs());
+        let d = case.ray.direction;
+        if !(tame(size) && tame(d.abs().max_element()) && tame(smallest(&case.solid))) {
+            continue;
+        }
+        let Some(truth) = oracle::truth(case) else { continue };
+        let Some(shape) = table::make_shape(&case.solid) else { continue };
+        let Some(hit) = (if shipped { shape.intersect(&case.ray, case.within) } else { entry.answer(case).flatten() })
+        else {
+            continue;
+        };
+        if !truth.parts.contains(&hit.part) || !hit.lambda.is_finite() {
+            continue;
+        }
+        let lambda = truth.lambda.enclosure().lo;
+        let exact_point = Big3(std::array::from_fn(|k| {
+            &Big::from(case.ray.origin[k]) + &(&lambda * &Big::from(case.ray.direction[k]))
+        }));
+        let Some(exact_normal) = normal_at(&case.solid, &exact_point, hit.part) else { continue };
+        let (point, bound, normal) = if shipped {
+            let p = shape.point(&case.ray, &hit);
+            (p.position, p.error, shape.normal(&case.ray, &hit))
+        } else {
+            let p = case.ray.at(hit.lambda);
+            let normal = normal_at(&case.solid, &p.into(), hit.part).unwrap_or(DVec3::NAN);
+            (p, f64::INFINITY, normal)
+        };
+        if !point.is_finite() || near_apex(&case.solid, &exact_point, hit.part) {
+            continue;
+        }
+        let off = distance(&case.solid, point, hit.part);
+        // A point's own size: a hit near the origin from far away is judged by where it is.
+        out.points.push(off / measure::ulp(point.abs().max_element().max(largest(&case.solid))));
+        if let Some(v) = &mut out.violations {
+            *v += usize::from(off > bound * (1.0 + 1e-12));
+        }
+        out.normals.push((normal - exact_normal).length() / 2f64.powi(-53));
+
+        let mut rng = Rng::new(i as u64);
+        let away = exact_normal * rng.log(1e-3, 1.0) + rng.across(exact_normal);
+        out.spawned += 1;
+        out.rehits += usize::from(if shipped {
+            let ray = Surface::new(shape.as_ref(), &case.ray, &hit).spawn(away);
+            shape.intersect(&ray, Interval::FORWARD).is_some()
+        } else {
+            let ray = Ray { origin: point, direction: away };
+            answer(entry.function, &ray, &case.solid).is_some()
+        });
+    }
+    out.points.sort_by(f64::total_cmp);
+    out.normals.sort_by(f64::total_cmp);
+    out
+}
+
+fn answer(function: Function, ray: &Ray, solid: &Solid) -> Answer {
+    let case = Case { ray: *ray, within: Interval::FORWARD, solid: solid.clone() };
+    let entry = Entry { kernel: crate::kernels::kind(solid), name: "", origin: Origin::TextbookF64, function };
+    entry.answer(&case).flatten()
+}
+
+fn largest(solid: &Solid) -> f64 {
+    let of = |points: &[DVec3]| points.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    match solid {
+        Solid::Plane { point, .. } => of(&[*point]),
+        Solid::Triangle(v) => of(v),
+        Solid::Sphere { center, radius } => of(&[*center]).max(*radius),
+        Solid::Frustum { base, top, base_radius, top_radius } => of(&[*base, *top]).max(*base_radius).max(*top_radius),
+        _ => f64::NAN,
+    }
+}
+
+fn smallest(solid: &Solid) -> f64 {
+    match solid {
+        Solid::Plane { normal, .. } => normal.abs().max_element(),
+        Solid::Sphere { radius, .. } => *radius,
+        Solid::Frustum { base, top, base_radius, top_radius } => {
+            base_radius.max(*top_radius).min((*top - *base).abs().max_element())
+        }
+        _ => 1.0,
+    }
+}
+
+fn to_f64(v: &Big3) -> DVec3 {
+    DVec3::from_array(std::array::from_fn(|i| v.0[i].to_f64()))
+}
+
+/// w = p − base, a = top − base, w·a and a² exactly.
+fn along(base: DVec3, top: DVec3, p: &Big3) -> (Big3, Big3, Big, Big) {
+    let a = Big3::from(top).minus(&base.into());
+    let w = p.minus(&base.into());
+    let (wa, aa) = (w.dot(&a), a.dot(&a));
+    (w, a, wa, aa)
+}
+
+/// The outward unit normal at a point, from differences and products that are exact; `None` at an apex.
+pub fn normal_at(solid: &Solid, p: &Big3, part: u32) -> Option<DVec3> {
+    let unit = |v: &Big3| to_f64(v).try_normalize();
+    match solid {
+        Solid::Plane { normal, .. } => normal.try_normalize(),
+        Solid::Triangle([a, b, c]) => {
+            let a = Big3::from(*a);
+            unit(&Big3::from(*b).minus(&a).cross(&Big3::from(*c).minus(&a)))
+        }
+        Solid::Sphere { center, .. } => unit(&p.minus(&(*center).into())),
+        Solid::Frustum { base, top, base_radius, top_radius } => {
+            let (w, a, wa, aa) = along(*base, *top, p);
+            let axis = to_f64(&a);
+            match part {
+                WALL => {
+                    // w·a² − a·(w·a) points straight away from the axis.
+                    let radial = Big3(std::array::from_fn(|i| &(&w.0[i] * &aa) - &(&a.0[i] * &wa)));
+                    let radial = unit(&radial)?;
+                    (radial + axis * ((base_radius - top_radius) / aa.to_f64())).try_normalize()
+                }
+                oracle::BASE => (-axis).try_normalize(),
+                _ => axis.try_normalize(),
+            }
+        }
+        _ => None,
+    }
+}
+
+/// Where a wall's radius is next to nothing, and with it the direction its normal has.
+fn near_apex(solid: &Solid, p: &Big3, part: u32) -> bool {
+    let Solid::Frustum { base, top, base_radius, top_radius } = solid else { return false };
+    let (_, _, wa, aa) = along(*base, *top, p);
+    let radius = base_radius + (top_radius - base_radius) * (wa.to_f64() / aa.to_f64());
+    part == WALL && radius.abs() < 1e-9 * base_radius.max(*top_radius)
+}
+
+/// How far `q` is off the surface of its part, from numerators that are exact.
+fn distance(solid: &Solid, q: DVec3, part: u32) -> f64 {
+    let p = Big3::from(q);
+    match solid {
+        Solid::Plane { point, normal } => {
+            let n = Big3::from(*normal);
+            (n.dot(&p.minus(&(*point).into())).to_f64() / normal.length()).abs()
+        }
+        Solid::Triangle([a, b, c]) => {
+            let a = Big3::from(*a);
+            let n = Big3::from(*b).minus(&a).cross(&Big3::from(*c).minus(&a));
+            (n.dot(&p.minus(&a)).to_f64() / to_f64(&n).length()).abs()
+        }
+        Solid::Sphere { center, radius } => {
+            let f = p.minus(&(*center).into());
+            let off = f.norm2() - Big::from(*radius).squared();
+            (off.to_f64() / (to_f64(&f).length() + radius)).abs()
+        }
+        Solid::Frustum { base, top, base_radius, top_radius } => {
+            let (w, a, wa, aa) = along(*base, *top, &p);
+            let height = to_f64(&a).length();
+            if part == oracle::BASE {
+                return (wa.to_f64() / height).abs();
+            }
+            if part == oracle::TOP {
+                return ((&wa - &aa).to_f64() / height).abs();
+            }
+            // a⁴(ρ² − r(t)²), r(t) = r₀ + (r₁ − r₀)·w·a/a².
+            let growth = &Big::from(*top_radius) - &Big::from(*base_radius);
+            let radius = &(&Big::from(*base_radius) * &aa) + &(&growth * &wa);
+            let rho2 = &(&w.norm2() * &aa) - &wa.squared();
+            let off = &(&rho2 * &aa) - &radius.squared();
+            let a2 = aa.to_f64();
+            let sum = (rho2.to_f64().max(0.0) / a2).sqrt() + (radius.to_f64() / a2).abs();
+            let cosine = height / height.hypot(growth.to_f64());
+            if sum == 0.0 { 0.0 } else { (off.to_f64() / (a2 * a2) / sum * cosine).abs() }
+        }
+        _ => f64::NAN,
+    }
+}
+
+/// A textbook hit's normal, for pictures.
+pub fn textbook_normal(solid: &Solid, ray: &Ray, hit: &Hit) -> DVec3 {
+    normal_at(solid, &ray.at(hit.lambda).into(), hit.part).unwrap_or(DVec3::ZERO)
+}
