@@ -37,8 +37,9 @@ impl Checker {
 impl Texture for Checker {
     fn color(&self, at: DVec2) -> Rgb {
         let field = (at * self.fields).floor();
-        // Reduced one by one: the sum of two huge numbers may lose its parity. −1 % 2 is −1, hence the comparison.
-        if (field.x % 2.0 == 0.0) == (field.y % 2.0 == 0.0) { self.even } else { self.odd }
+        // One by one: the sum of two huge numbers may lose its parity.
+        let even = |n: f64| (0.5 * n).fract() == 0.0;
+        if even(field.x) == even(field.y) { self.even } else { self.odd }
     }
 }
 
