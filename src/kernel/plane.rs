@@ -76,7 +76,7 @@ pub(super) fn quotient<P: Product>(ray: &Ray, point: DVec3, [n, n_lo]: [DVec3; 2
         & (vanished < 1.0)
         & (sizes + den.abs() + q.abs() < LARGE)
         & (lambda.abs() > SMALL)
-        & ((beyond_rounding < 0.5 * U * lambda.abs()) | (beyond_rounding * largest(d) < FLOOR * largest(s)));
+        & ((beyond_rounding < 0.5 * U * lambda.abs()) || (beyond_rounding * largest(d) < FLOOR * largest(s)));
     if !usable {
         return Quotient::Uncertain;
     }
