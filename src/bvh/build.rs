@@ -4,12 +4,17 @@
 use super::frame::Frame;
 use crate::Aabb;
 
-/// An object's box in the frame.
+/// An object's box in the frame; four lanes, so that a box is two vectors. The fourth of `max` is the object's number.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Item {
-    pub(crate) min: [f32; 3],
-    pub(crate) index: u32,
-    pub(crate) max: [f32; 3],
+    min: [f32; 4],
+    max: [f32; 4],
+}
+
+impl Item {
+    pub(crate) fn index(&self) -> u32 {
+        self.max[3].to_bits()
+    }
 }
 
 /// A node of the binary tree. A leaf holds `count` items from `first`; an inner node (`count` = 0) has its left child
@@ -56,7 +61,8 @@ pub(crate) fn build(count: usize, bounds: &(dyn Fn(usize) -> Aabb + Sync), leaf:
         let holds_nothing = b.is_empty() && !b.min.is_nan() && !b.max.is_nan();
         if !holds_nothing {
             let (min, max) = frame.outward(&b);
-            items.push(Item { min, index: i as u32, max });
+            let (min, max) = ([min[0], min[1], min[2], 0.0], [max[0], max[1], max[2], f32::from_bits(i as u32)]);
+            items.push(Item { min, max });
         }
     }
     let vacant = Node { min: [0.0; 3], first: 0, max: [0.0; 3], count: 0 };
@@ -77,25 +83,25 @@ struct Place {
 
 /// A box in f32 being grown; plain comparisons, so that NaN never enters and the compiler uses vector minima.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Box3 {
-    pub(crate) min: [f32; 3],
-    pub(crate) max: [f32; 3],
+struct Box3 {
+    min: [f32; 4],
+    max: [f32; 4],
 }
 
 impl Box3 {
-    pub(crate) const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+    const EMPTY: Self = Self { min: [f32::INFINITY; 4], max: [f32::NEG_INFINITY; 4] };
 
     #[inline(always)]
-    pub(crate) fn grow(&mut self, min: &[f32; 3], max: &[f32; 3]) {
-        for i in 0..3 {
+    fn grow(&mut self, min: &[f32; 4], max: &[f32; 4]) {
+        for i in 0..4 {
             self.min[i] = if min[i] < self.min[i] { min[i] } else { self.min[i] };
             self.max[i] = if max[i] > self.max[i] { max[i] } else { self.max[i] };
         }
     }
 
     #[inline(always)]
-    pub(crate) fn half_area(&self) -> f32 {
-        half_area(&self.min, &self.max)
+    fn half_area(&self) -> f32 {
+        half_area(&three(self.min), &three(self.max))
     }
 
     fn around(items: &[Item]) -> Self {
@@ -105,6 +111,10 @@ impl Box3 {
         }
         b
     }
+}
+
+fn three([x, y, z, _]: [f32; 4]) -> [f32; 3] {
+    [x, y, z]
 }
 
 /// Half the surface of a box; infinite boxes have a large finite one, so that sums stay comparable.
@@ -124,7 +134,7 @@ fn middle(item: &Item, axis: usize) -> f32 {
 
 fn subdivide(items: &mut [Item], nodes: &mut [Node], bounds: Box3, at: Place, leaf: usize) {
     let n = items.len();
-    let (min, max) = (bounds.min, bounds.max);
+    let (min, max) = (three(bounds.min), three(bounds.max));
     let Some((mid, left, right)) = split(items, &bounds, at.depth, leaf) else {
         nodes[0] = Node { min, first: at.item, max, count: n as u32 };
         return;
@@ -164,7 +174,7 @@ fn split(items: &mut [Item], bounds: &Box3, depth: u32, leaf: usize) -> Option<(
     };
     let mut centers = Box3::EMPTY;
     for i in &*items {
-        let m = [middle(i, 0), middle(i, 1), middle(i, 2)];
+        let m = [middle(i, 0), middle(i, 1), middle(i, 2), 0.0];
         centers.grow(&m, &m);
     }
     let mut scale = [0.0f32; 3];

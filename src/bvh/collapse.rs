@@ -1,6 +1,6 @@
 //! From the binary tree to nodes of eight: the child with the largest surface is opened until there are eight.
 
-use super::build::{Binary, Node, half_area};
+use super::build::{Binary, Item, Node, half_area};
 use super::wide::{LEAF, NONE, Wide, WideNode};
 
 impl Wide {
@@ -116,7 +116,7 @@ impl Binary {
 
     /// The objects in the order of the leaves.
     pub(crate) fn order(&self) -> Vec<u32> {
-        self.items.iter().map(|i| i.index).collect()
+        self.items.iter().map(Item::index).collect()
     }
 
     /// Where each leaf's items start, in order, and the end.

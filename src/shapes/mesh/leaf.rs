@@ -105,7 +105,7 @@ pub(super) fn build(positions: &[DVec3], triangles: &[[u32; 3]]) -> (Wide, Vec<L
         .map(|range| {
             let mut leaf = Leaf::EMPTY;
             for (lane, item) in binary.items[range[0] as usize..range[1] as usize].iter().enumerate() {
-                leaf.set(lane, &tree.frame, &corners(item.index as usize), item.index);
+                leaf.set(lane, &tree.frame, &corners(item.index() as usize), item.index());
             }
             leaf
         })

@@ -24,7 +24,6 @@ fn closest_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> O
         within,
         local: &local,
         probe: Probe::new(&local),
-        sure: Sure::new(&local, within),
         t_max: local.t_max,
         passed: [Passed { leaf: 0, lane: 0, t: 0.0 }; MOST_PASSED],
         count: 0,
@@ -47,8 +46,7 @@ fn any_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> bool 
     let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else {
         return closest_of_all(mesh, ray, within).is_some();
     };
-    let sure = Sure::new(&local, within);
-    let mut first = First { mesh, ray, probe: Probe::new(&local), sure, t_max: local.t_max, within };
+    let mut first = First { mesh, ray, within, local: &local, probe: Probe::new(&local) };
     bvh::any(simd, &mesh.tree, &local, &mut first)
 }
 
@@ -136,7 +134,6 @@ struct Nearest<'a> {
     within: Interval,
     local: &'a LocalRay,
     probe: Probe,
-    sure: Sure,
     t_max: f32,
     passed: [Passed; MOST_PASSED],
     count: usize,
@@ -147,6 +144,7 @@ impl Nearest<'_> {
     /// Out of line, so that the walk keeps its registers.
     #[inline(never)]
     fn candidates<S: Simd>(&mut self, simd: S, leaf: u32, mut lanes: u32, through: u32, depths: &Depths) {
+        let sure = Sure::new(self.local, self.within);
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
@@ -156,7 +154,7 @@ impl Nearest<'_> {
             if certain && low > self.t_max {
                 continue;
             }
-            if !(certain && self.sure.holds((low, high))) {
+            if !(certain && sure.holds((low, high))) {
                 self.confirm(simd, leaf, lane);
                 continue;
             }
@@ -217,17 +215,16 @@ impl bvh::Closest for Nearest<'_> {
 struct First<'a> {
     mesh: &'a Mesh,
     ray: &'a Ray,
-    probe: Probe,
-    sure: Sure,
-    t_max: f32,
     within: Interval,
+    local: &'a LocalRay,
+    probe: Probe,
 }
 
 impl bvh::Any for First<'_> {
     #[inline(always)]
     fn leaf<S: Simd>(&mut self, simd: S, leaf: u32) -> bool {
         let leaf = &self.mesh.leaves[leaf as usize];
-        let outcome = self.probe.test(simd, leaf, self.t_max);
+        let outcome = self.probe.test(simd, leaf, self.local.t_max);
         outcome.maybe != 0 && self.candidates(simd, leaf, outcome.maybe, outcome.through, &outcome.depths())
     }
 }
@@ -235,8 +232,9 @@ impl bvh::Any for First<'_> {
 impl First<'_> {
     #[inline(never)]
     fn candidates<S: Simd>(&self, simd: S, leaf: &Leaf, lanes: u32, through: u32, depths: &Depths) -> bool {
+        let sure = Sure::new(self.local, self.within);
         let each = |lanes: u32| (0..8).filter(move |lane| lanes >> lane & 1 == 1);
-        each(lanes & through).any(|lane| self.sure.holds(depths.interval(lane)))
+        each(lanes & through).any(|lane| sure.holds(depths.interval(lane)))
             || each(lanes).any(|lane| self.confirm(simd, leaf, lane))
     }
 

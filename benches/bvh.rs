@@ -1,0 +1,126 @@
+//! Trees: building, and walking with rays of six kinds, on every instruction level. Hit rates are asserted, so that no
+//! figure is of rays that miss.
+
+#[path = "../tests/meshes/mod.rs"]
+mod meshes;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use glam::DVec3;
+use meshes::{Random, icosphere, torus};
+use std::hint::black_box;
+use truehit::bvh::Level;
+use truehit::{Interval, Mesh, Ray, Shape, glam};
+
+const RAYS: usize = 4096;
+
+struct Rays {
+    name: &'static str,
+    any: bool,
+    rays: Vec<(Ray, Interval)>,
+    /// The share that must hit.
+    least: f64,
+}
+
+/// Camera rays at a torus in rows, rays that leave its surface, rays anywhere, and shadow rays to a light.
+fn rays(mesh: &Mesh) -> Vec<Rays> {
+    let mut random = Random(1);
+    let eye = DVec3::new(0.5, -2.6, 1.7);
+    let forward = (-eye).normalize();
+    let right = forward.cross(DVec3::Z).normalize();
+    let up = right.cross(forward);
+    let camera: Vec<_> = (0..RAYS)
+        .map(|i| {
+            let (x, y) = ((i % 64) as f64 / 64.0 - 0.5, (i / 64) as f64 / 64.0 - 0.5);
+            (Ray::new(eye, forward + 0.7 * (x * right + y * up)), Interval::FORWARD)
+        })
+        .collect();
+    let points: Vec<(DVec3, DVec3)> = camera
+        .iter()
+        .filter_map(|(ray, within)| {
+            let hit = mesh.intersect(ray, *within)?;
+            let normal = mesh.normal(ray, &hit);
+            Some((mesh.point(ray, &hit).position + 1e-6 * normal, normal))
+        })
+        .collect();
+    let at = |i: usize| points[i % points.len()];
+    let bounce: Vec<_> = (0..RAYS)
+        .map(|i| (Ray::new(at(i).0, at(i).1 + random.direction()), Interval::FORWARD))
+        .collect();
+    let anywhere: Vec<_> =
+        (0..RAYS).map(|_| (Ray::new(1.2 * random.in_cube(), random.direction()), Interval::FORWARD)).collect();
+    let light = DVec3::new(3.0, 1.0, 2.0);
+    let shadow = (0..RAYS).map(|i| (Ray::new(at(i).0, light - at(i).0), Interval::new(0.0, 1.0))).collect();
+    let set = |name, any, rays, least| Rays { name, any, rays, least };
+    vec![
+        set("primary", false, camera, 0.3),
+        set("bounce", false, bounce.clone(), 0.05),
+        set("random", false, anywhere.clone(), 0.1),
+        set("shadow", true, shadow, 0.05),
+        set("bounce any", true, bounce, 0.05),
+        set("random any", true, anywhere, 0.1),
+    ]
+}
+
+fn traversal(c: &mut Criterion) {
+    let (positions, triangles) = torus(220);
+    let mut mesh = Mesh::new(positions, triangles).expect("a torus");
+    for set in rays(&mesh) {
+        let hits = set.rays.iter().filter(|(ray, within)| mesh.occludes(ray, *within)).count();
+        let share = hits as f64 / set.rays.len() as f64;
+        assert!(share >= set.least, "{}: {share}", set.name);
+        let mut group = c.benchmark_group(format!("traversal/{} ({:.0} % hit)", set.name, 100.0 * share));
+        group.throughput(Throughput::Elements(set.rays.len() as u64));
+        for (name, level) in Level::all() {
+            mesh.set_level(level);
+            group.bench_function(name, |b| {
+                b.iter(|| {
+                    let met = |(ray, within): &(Ray, Interval)| {
+                        if set.any {
+                            mesh.occludes(black_box(ray), *within)
+                        } else {
+                            mesh.intersect(black_box(ray), *within).is_some()
+                        }
+                    };
+                    set.rays.iter().filter(|r| met(r)).count()
+                });
+            });
+        }
+        group.finish();
+    }
+}
+
+/// One node and one leaf: a mesh of eight triangles, met by every ray.
+fn leaf(c: &mut Criterion) {
+    let (positions, triangles) = icosphere(0);
+    let mesh = Mesh::new(positions, triangles[..8].to_vec()).expect("eight triangles");
+    let mut random = Random(2);
+    let rays: Vec<_> = std::iter::repeat_with(|| Ray::new(0.05 * random.in_cube(), random.direction()))
+        .filter(|ray| mesh.occludes(ray, Interval::FORWARD))
+        .take(RAYS)
+        .collect();
+    let mut group = c.benchmark_group("leaf");
+    group.throughput(Throughput::Elements(RAYS as u64));
+    group.bench_function("closest", |b| {
+        b.iter(|| rays.iter().filter(|r| mesh.intersect(black_box(r), Interval::FORWARD).is_some()).count());
+    });
+    group.bench_function("any", |b| {
+        b.iter(|| rays.iter().filter(|r| mesh.occludes(black_box(r), Interval::FORWARD)).count());
+    });
+    group.finish();
+}
+
+fn build(c: &mut Criterion) {
+    let mut group = c.benchmark_group("build");
+    group.sample_size(10);
+    for n in [22, 70, 220] {
+        let (positions, triangles) = torus(n);
+        group.throughput(Throughput::Elements(triangles.len() as u64));
+        group.bench_function(format!("{} triangles", triangles.len()), |b| {
+            b.iter(|| Mesh::new(positions.clone(), triangles.clone()));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, traversal, leaf, build);
+criterion_main!(benches);
