@@ -13,7 +13,7 @@ use truehit::{Interval, Mesh, Ray, Shape, glam};
 
 const RAYS: usize = 4096;
 
-struct Rays {
+struct RaySet {
     name: &'static str,
     any: bool,
     rays: Vec<(Ray, Interval)>,
@@ -22,7 +22,7 @@ struct Rays {
 }
 
 /// Camera rays at a torus in rows, rays that leave its surface, rays anywhere, and shadow rays to a light.
-fn rays(mesh: &Mesh) -> Vec<Rays> {
+fn rays(mesh: &Mesh) -> Vec<RaySet> {
     let mut random = Random(1);
     let eye = DVec3::new(0.5, -2.6, 1.7);
     let forward = (-eye).normalize();
@@ -43,14 +43,13 @@ fn rays(mesh: &Mesh) -> Vec<Rays> {
         })
         .collect();
     let at = |i: usize| points[i % points.len()];
-    let bounce: Vec<_> = (0..RAYS)
-        .map(|i| (Ray::new(at(i).0, at(i).1 + random.direction()), Interval::FORWARD))
-        .collect();
+    let bounce: Vec<_> =
+        (0..RAYS).map(|i| (Ray::new(at(i).0, at(i).1 + random.direction()), Interval::FORWARD)).collect();
     let anywhere: Vec<_> =
         (0..RAYS).map(|_| (Ray::new(1.2 * random.in_cube(), random.direction()), Interval::FORWARD)).collect();
     let light = DVec3::new(3.0, 1.0, 2.0);
     let shadow = (0..RAYS).map(|i| (Ray::new(at(i).0, light - at(i).0), Interval::new(0.0, 1.0))).collect();
-    let set = |name, any, rays, least| Rays { name, any, rays, least };
+    let set = |name, any, rays, least| RaySet { name, any, rays, least };
     vec![
         set("primary", false, camera, 0.3),
         set("bounce", false, bounce.clone(), 0.05),
