@@ -6,7 +6,7 @@ mod meshes;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
-use meshes::{Random, icosphere, torus};
+use meshes::{Random, icosphere, moved, torus};
 use std::hint::black_box;
 use truehit::bvh::Level;
 use truehit::{Interval, Mesh, Ray, Shape, glam};
@@ -51,18 +51,24 @@ fn rays(mesh: &Mesh) -> Vec<RaySet> {
     let shadow = (0..RAYS).map(|i| (Ray::new(at(i).0, light - at(i).0), Interval::new(0.0, 1.0))).collect();
     let set = |name, any, rays, least| RaySet { name, any, rays, least };
     vec![
-        set("primary", false, camera, 0.3),
-        set("bounce", false, bounce.clone(), 0.05),
-        set("random", false, anywhere.clone(), 0.1),
+        set("primary", false, camera, 0.9),
+        set("bounce", false, bounce.clone(), 0.9),
+        set("random", false, anywhere.clone(), 0.9),
         set("shadow", true, shadow, 0.05),
-        set("bounce any", true, bounce, 0.05),
-        set("random any", true, anywhere, 0.1),
+        set("bounce any", true, bounce, 0.9),
+        set("random any", true, anywhere, 0.9),
     ]
 }
 
 fn traversal(c: &mut Criterion) {
-    let (positions, triangles) = torus(220);
-    let mut mesh = Mesh::new(positions, triangles).expect("a torus");
+    // In a spherical room, so that rays that leave the torus meet something too.
+    let (mut positions, mut triangles) = torus(220);
+    let room = moved(icosphere(4), 4.0, DVec3::ZERO);
+    let base = positions.len() as u32;
+    positions.extend(room.0);
+    // Facing inward.
+    triangles.extend(room.1.into_iter().map(|[a, b, c]| [a + base, c + base, b + base]));
+    let mut mesh = Mesh::new(positions, triangles).expect("a torus in a room");
     for set in rays(&mesh) {
         let hits = set.rays.iter().filter(|(ray, within)| mesh.occludes(ray, *within)).count();
         let share = hits as f64 / set.rays.len() as f64;
