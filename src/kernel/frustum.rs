@@ -271,6 +271,8 @@ fn wall_step<P: Product>(
 #[cold]
 #[inline(never)]
 fn refine(ray: &Ray, base: &DVec3, top: &DVec3, r0: f64, r1: f64, min: f64, max: f64) -> Option<Hit> {
+    #[cfg(test)]
+    tests::COLD.with(|n| n.set(n.get() + 1));
     let within = Interval { min, max };
     let solid = Solid { base: *base, top: *top, base_radius: r0, top_radius: r1 };
     if !ray.is_valid() || !solid.is_valid() || within.is_empty() {
@@ -466,6 +468,12 @@ fn locate<N: Number>(point: DVec3, solid: &Solid) -> Result<Ordering, Undecided>
 mod tests {
     use super::super::search::{Rational, climb, cross3, dot3, each, exact, minus};
     use super::*;
+    use std::cell::Cell;
+
+    thread_local! {
+        /// How often the cold path was taken.
+        pub(super) static COLD: Cell<usize> = const { Cell::new(0) };
+    }
 
     /// Base, top, radii and a ray from near or far, with few relations or near-ties between them.
     fn setting(x: &[f64]) -> (Ray, Solid) {
@@ -620,6 +628,27 @@ mod tests {
             });
             assert!((0.003..1.0).contains(&worst), "{name}: {worst}");
         }
+    }
+
+    #[test]
+    fn ordinary_rays_hardly_ever_need_the_cold_path() {
+        let (mut cases, mut hits) = (0, 0);
+        each(400_000, DIMENSION, |x| {
+            let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
+            let Some(u) = v(9).try_normalize() else { return };
+            let (base, axis) = (5.0 * v(0), 4.0 * v(3));
+            let base_radius = 2f64.powf(2.0 * x[12]);
+            let top_radius = [base_radius, 0.0, 2.0 * x[13].abs()][cases % 3];
+            let size = axis.length().max(base_radius).max(top_radius);
+            let target = base + x[14].abs() * axis + 0.4 * v(6) * size;
+            let ray = Ray { origin: target - u * size * (6.0 + 4.0 * x[15]), direction: u };
+            cases += 1;
+            hits +=
+                usize::from(intersect(&ray, base, base + axis, base_radius, top_radius, Interval::FORWARD).is_some());
+        });
+        let cold = COLD.get();
+        println!("frustum: {cold} of {cases} ordinary rays, {hits} hits");
+        assert!(cold * 10_000 < cases && hits * 3 > cases);
     }
 
     #[test]

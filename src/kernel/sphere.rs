@@ -157,6 +157,8 @@ fn small_root<P: Product>(ray: &Ray, center: DVec3, r: f64, slope: f64) -> (f64,
 #[cold]
 #[inline(never)]
 fn refine(ray: &Ray, x: f64, y: f64, z: f64, radius: f64, min: f64, max: f64) -> Option<Hit> {
+    #[cfg(test)]
+    tests::COLD.with(|n| n.set(n.get() + 1));
     let (center, within) = (DVec3::new(x, y, z), Interval { min, max });
     if !accepts(ray, center, radius) || within.is_empty() {
         return None;
@@ -222,8 +224,14 @@ fn locate<N: Number>(point: DVec3, center: DVec3, radius: f64) -> Result<Orderin
 
 #[cfg(test)]
 mod tests {
-    use super::super::search::{Rational, climb, cross3, dot3, exact, minus};
+    use super::super::search::{Rational, climb, cross3, dot3, each, exact, minus};
     use super::*;
+    use std::cell::Cell;
+
+    thread_local! {
+        /// How often the cold path was taken.
+        pub(super) static COLD: Cell<usize> = const { Cell::new(0) };
+    }
 
     /// f = x₀..₂ over 2^(10·x₇), d = x₃..₅, r from |f × d|/|d| and x₆: from clear hits to grazing ones.
     fn setting(x: &[f64]) -> Option<(DVec3, DVec3, DVec3, f64)> {
@@ -277,9 +285,25 @@ mod tests {
     }
 
     #[test]
+    fn ordinary_rays_hardly_ever_need_the_cold_path() {
+        let (mut cases, mut hits) = (0, 0);
+        each(400_000, 9, |x| {
+            let (f, u, across) = (DVec3::new(x[0], x[1], x[2]), DVec3::new(x[3], x[4], x[5]), x[6]);
+            let (Some(u), Some(side)) = (u.try_normalize(), u.cross(f).try_normalize()) else { return };
+            let (center, radius) = (5.0 * f, 2f64.powf(3.0 * x[7]));
+            let origin = center + side * radius * across.abs().sqrt() * 1.4 - u * radius * (6.0 + 4.0 * x[8]);
+            cases += 1;
+            hits += usize::from(intersect(&Ray { origin, direction: u }, center, radius, Interval::FORWARD).is_some());
+        });
+        let cold = COLD.get();
+        println!("sphere: {cold} of {cases} ordinary rays, {hits} hits");
+        assert!(cold * 10_000 < cases && hits * 3 > cases);
+    }
+
+    #[test]
     fn both_products_answer_with_the_same_bits() {
         let mut seen = [0; 2];
-        super::super::search::each(20_000, 11, |x| {
+        each(20_000, 11, |x| {
             let Some((o, c, d, r)) = setting(x) else { return };
             let ray = Ray { origin: o, direction: d };
             let answers = [fast::<Fused>(&ray, c, r, Interval::FORWARD), fast::<Split>(&ray, c, r, Interval::FORWARD)];
