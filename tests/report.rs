@@ -69,7 +69,7 @@ fn a_bound_too_small_shows() {
 #[test]
 fn misses_and_inventions_are_counted_one_by_one() {
     fn odd(ray: &Ray) -> bool {
-        ray.origin.x.to_bits() % 8 == 0
+        ray.origin.x.to_bits().is_multiple_of(8)
     }
     fn blind(ray: &Ray, center: DVec3, radius: f64, within: Interval) -> Option<Hit> {
         if odd(ray) { None } else { sphere::intersect(ray, center, radius, within) }
@@ -106,7 +106,7 @@ fn a_wrong_part_shows() {
 #[test]
 fn a_slow_kernel_and_its_slow_rays_show() {
     fn slow_at_times(ray: &Ray, center: DVec3, radius: f64, within: Interval) -> Option<Hit> {
-        if ray.origin.x.to_bits() % 8 == 0 {
+        if ray.origin.x.to_bits().is_multiple_of(8) {
             for _ in 0..400 {
                 std::hint::black_box(sphere::intersect(ray, center, radius, within));
             }
@@ -118,7 +118,7 @@ fn a_slow_kernel_and_its_slow_rays_show() {
     let (quick, slow) = (speed(&on_spheres(sphere::intersect)), speed(&on_spheres(slow_at_times)));
     assert!(slow.throughput.median > 5.0 * quick.throughput.median, "{slow:?}");
     assert!(slow.latency.median > 5.0 * quick.latency.median);
-    let share = sheet.cases.iter().filter(|c| c.ray.origin.x.to_bits() % 8 == 0).count() as f64 / CASES as f64;
+    let share = sheet.cases.iter().filter(|c| c.ray.origin.x.to_bits().is_multiple_of(8)).count() as f64 / CASES as f64;
     let seen = slow.slower_than(20.0 * quick.typical());
     assert!((seen - share).abs() < 0.03, "{seen} of {share}");
 }

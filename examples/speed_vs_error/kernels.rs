@@ -6,6 +6,10 @@ use truehit::glam::{DAffine3, DVec3};
 use truehit::{Hit, Interval, Ray};
 
 pub type Answer = Option<Hit>;
+/// Where a box is entered and left.
+pub type Passage = Option<(f64, f64)>;
+/// A ray, its interval and the other arguments.
+pub type Arguments<A> = (Ray, Interval, A);
 
 /// A kernel by its shape's signature.
 #[derive(Clone, Copy)]
@@ -15,7 +19,7 @@ pub enum Function {
     Polygon(fn(&Ray, &[&[DVec3]], Interval) -> Answer),
     Sphere(fn(&Ray, DVec3, f64, Interval) -> Answer),
     Frustum(fn(&Ray, DVec3, DVec3, f64, f64, Interval) -> Answer),
-    Slab(fn(&Ray, DVec3, DVec3, Interval) -> Option<(f64, f64)>),
+    Slab(fn(&Ray, DVec3, DVec3, Interval) -> Passage),
     /// A shape of the crate, through `dyn Shape`.
     Shape(fn(&Solid) -> Option<Box<dyn truehit::Shape>>),
     /// The lecture's way with a deformed shape: map the ray in this precision, then ask this entry.
@@ -43,14 +47,14 @@ pub struct Entry {
 
 /// A case with its arguments laid out as the kernel takes them, so that nothing else is timed.
 pub enum Prepared {
-    Plane(Vec<(Ray, Interval, (DVec3, DVec3))>),
-    Triangle(Vec<(Ray, Interval, [DVec3; 3])>),
-    Polygon(Vec<(Ray, Interval, Vec<Vec<DVec3>>)>),
-    Sphere(Vec<(Ray, Interval, (DVec3, f64))>),
-    Frustum(Vec<(Ray, Interval, (DVec3, DVec3, f64, f64))>),
-    Slab(Vec<(Ray, Interval, (DVec3, DVec3))>),
-    Shape(Vec<(Ray, Interval, Box<dyn truehit::Shape>)>),
-    Mapped(Vec<(Ray, Interval, (DAffine3, Vec<Solid>))>),
+    Plane(Vec<Arguments<(DVec3, DVec3)>>),
+    Triangle(Vec<Arguments<[DVec3; 3]>>),
+    Polygon(Vec<Arguments<Vec<Vec<DVec3>>>>),
+    Sphere(Vec<Arguments<(DVec3, f64)>>),
+    Frustum(Vec<Arguments<(DVec3, DVec3, f64, f64)>>),
+    Slab(Vec<Arguments<(DVec3, DVec3)>>),
+    Shape(Vec<Arguments<Box<dyn truehit::Shape>>>),
+    Mapped(Vec<Arguments<(DAffine3, Vec<Solid>)>>),
 }
 
 fn call_solid(function: Function, ray: &Ray, within: Interval, solid: &Solid) -> Answer {
@@ -169,7 +173,7 @@ impl Entry {
             }
             (Function::Polygon(f), Prepared::Polygon(list)) => {
                 let f = black_box(f);
-                let views: Vec<(Ray, Interval, Vec<&[DVec3]>)> =
+                let views: Vec<Arguments<Vec<&[DVec3]>>> =
                     list.iter().map(|(r, w, c)| (*r, *w, c.iter().map(Vec::as_slice).collect())).collect();
                 timed!(views, |ray, a, within| f(ray, a, within))
             }

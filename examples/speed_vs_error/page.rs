@@ -124,16 +124,15 @@ impl Page<'_> {
     fn kernels(&self) -> Vec<(Kernel, Vec<(&'static str, Origin)>)> {
         let mut kernels: Vec<(Kernel, Vec<(&'static str, Origin)>)> = Vec::new();
         for row in self.rows {
-            let at = match kernels.iter().position(|k| k.0 == row.entry.kernel) {
-                Some(at) => at,
-                None => {
-                    kernels.push((row.entry.kernel, Vec::new()));
-                    kernels.len() - 1
-                }
-            };
+            // Rows come shape by shape.
+            if kernels.last().is_none_or(|k| k.0 != row.entry.kernel) {
+                kernels.push((row.entry.kernel, Vec::new()));
+            }
             let name = (row.entry.name, row.entry.origin);
-            if !kernels[at].1.contains(&name) {
-                kernels[at].1.push(name);
+            if let Some((_, names)) = kernels.last_mut()
+                && !names.contains(&name)
+            {
+                names.push(name);
             }
         }
         kernels
@@ -143,7 +142,7 @@ impl Page<'_> {
         let mut out = String::new();
         self.head(&mut out);
         self.summary(&mut out);
-        self.pictures(&mut out);
+        pictures(&mut out);
         self.losses(&mut out);
         self.surfaces(&mut out);
         meshes(&mut out);
@@ -199,21 +198,6 @@ impl Page<'_> {
             }
         }
         out.push('\n');
-    }
-
-    fn pictures(&self, out: &mut String) {
-        out.push_str(
-            "## Pictures\n\n\
-             ![Speed against error](pictures/pareto.svg)\n\n\
-             ![Error against distance](pictures/error-distance.svg)\n\n\
-             ![Error against grazing angle](pictures/error-grazing.svg)\n\n\
-             ![Error, cumulative](pictures/error-cdf.svg)\n\n\
-             ![Tightness of bounds](pictures/tightness.svg)\n\n\
-             ![Wrong decisions by scale and distance](pictures/wrong-by-scale.svg)\n\n\
-             ![A view from far away](pictures/far-view.png)\n\n\
-             Sphere, cylinder and cone of unit size through a telescope, from 1e6, 2e7 and 1e8 away: left the textbook\n\
-             kernels in f64, right truehit.\n\n",
-        );
     }
 
     /// Where the crate's kernels are not the fastest, or not as good as promised.
@@ -482,4 +466,19 @@ fn meshes(out: &mut String) {
         let _ = writeln!(out, "| {engine} | {} | {} | {} |", cells.join(" | "), leaks.join(" | "), wrong.join(" | "));
     }
     out.push('\n');
+}
+
+fn pictures(out: &mut String) {
+    out.push_str(
+        "## Pictures\n\n\
+         ![Speed against error](pictures/pareto.svg)\n\n\
+         ![Error against distance](pictures/error-distance.svg)\n\n\
+         ![Error against grazing angle](pictures/error-grazing.svg)\n\n\
+         ![Error, cumulative](pictures/error-cdf.svg)\n\n\
+         ![Tightness of bounds](pictures/tightness.svg)\n\n\
+         ![Wrong decisions by scale and distance](pictures/wrong-by-scale.svg)\n\n\
+         ![A view from far away](pictures/far-view.png)\n\n\
+         Sphere, cylinder and cone of unit size through a telescope, from 1e6, 2e7 and 1e8 away: left the textbook\n\
+         kernels in f64, right truehit.\n\n",
+    );
 }

@@ -1,7 +1,7 @@
 //! The plots of the report.
 
 use crate::kernels::{Entry, Origin};
-use crate::rows::Row;
+use crate::rows::{Row, Sheet};
 use crate::support::cases::{Case, Kernel};
 use crate::support::oracle;
 use crate::svg::{Axis, COLOURS, Panel, Svg, legend, power_of_ten};
@@ -269,7 +269,7 @@ pub fn heat(entries: &[Entry], n: u64) -> String {
             })
             .copied()
             .collect();
-        let grid: Vec<Vec<(Vec<Case>, Vec<Option<oracle::Truth>>)>> = scales
+        let grid: Vec<Vec<Sheet>> = scales
             .iter()
             .map(|&s| {
                 distances
@@ -279,7 +279,7 @@ pub fn heat(entries: &[Entry], n: u64) -> String {
                             .map(|seed| sweeps::from_distance(kernel, 10f64.powi(s), 10f64.powi(d), 1.1, seed))
                             .collect();
                         let truths = cases.iter().map(oracle::truth).collect();
-                        (cases, truths)
+                        Sheet { cases, truths }
                     })
                     .collect()
             })
@@ -288,8 +288,8 @@ pub fn heat(entries: &[Entry], n: u64) -> String {
             let (left, top) = (60.0 + column as f64 * 236.0, 62.0 + line as f64 * 240.0);
             svg.text(left + cell * 6.5, top - 8.0, &format!("{}: {}", kernel.name(), entry.name), "middle", "");
             for (j, row) in grid.iter().enumerate() {
-                for (i, (cases, truths)) in row.iter().enumerate() {
-                    let wrong = sweeps::point(entry, cases, truths).wrong;
+                for (i, sheet) in row.iter().enumerate() {
+                    let wrong = sweeps::point(entry, &sheet.cases, &sheet.truths).wrong;
                     let (x, y) = (left + i as f64 * cell, top + (12 - j) as f64 * cell);
                     svg.rectangle(x, y, cell - 1.0, cell - 1.0, COLOURS[3], if wrong == 0.0 { 0.35 } else { 0.0 });
                     if wrong > 0.0 {
