@@ -116,7 +116,7 @@ impl<'a> Surface<'a> {
             if departs(&ray, outward) {
                 return ray;
             }
-            step *= 2.0;
+            step *= 1024.0;
         }
     }
 }
