@@ -253,7 +253,7 @@ fn rays_and_intervals_that_hold_nothing_miss() {
 fn any_bits_give_an_answer() {
     let mut rng = Rng::new(80);
     let (mut built, mut hits) = (0, 0);
-    for i in 0..24_000 {
+    for i in 0..8_000 {
         // All bits; or a range of exponents in which something can be hit; or the edges of the range of floats.
         let kind = i % 4;
         let mut x = || match kind {
@@ -294,7 +294,7 @@ fn any_bits_give_an_answer() {
         }
     }
     println!("{built} shapes, {hits} hits");
-    assert!(built > 10_000 && hits > 500);
+    assert!(built > 5_000 && hits > 500);
 }
 
 fn ask_everything(s: &dyn Shape, ray: &Ray, hit: &Hit, direction: DVec3) {

@@ -11,8 +11,8 @@ use support::cases::{Case, Family, Solid};
 use support::families;
 use support::rng::Rng;
 use support::shapes::shape;
-use truehit::glam::{DVec2, DVec3};
-use truehit::{Aabb, Hit, Interval, Ray, Shape, SurfacePoint};
+use truehit::glam::{DAffine3, DMat3, DVec2, DVec3};
+use truehit::{Aabb, Affine, Hit, Interval, Ray, Shape, SurfacePoint};
 
 /// Runs `law` on `cases` random cases of all families whose solid is a shape; half of them ordinary rays. At least a
 /// third must hit.
@@ -209,6 +209,39 @@ fn exact_translations_change_nothing() {
         Ok(hit.is_some())
     });
     println!("{} moved exactly", compared.get());
+    assert!(compared.get() > 1000);
+}
+
+#[test]
+fn the_identity_map_changes_nothing_and_exact_maps_nest() {
+    let compared = Cell::new(0);
+    for_all("identity, nested", 10_000, |family, case, s, rng| {
+        let hit = s.intersect(&case.ray, case.within);
+        let same = Affine::new(s, DAffine3::IDENTITY).unwrap();
+        let mapped = same.intersect(&case.ray, case.within);
+        prop_assert_eq!(hit.map(|h| (h.lambda, h.part)), mapped.map(|h| (h.lambda, h.part)), "{}", family.name);
+        if let (Some(hit), Some(mapped)) = (hit, mapped) {
+            prop_assert!(mapped.error >= hit.error);
+            let (n, m) = (s.normal(&case.ray, &hit), same.normal(&case.ray, &hit));
+            prop_assert!((n - m).length() < 1e-15, "{} {n} {m}", family.name);
+        }
+        // A permutation with signs and powers of two, there and back: the ray's image is exact, and so is each map.
+        let k = 2f64.powi(rng.integer(-20, 20) as i32);
+        let turn = DMat3::from_cols(DVec3::Y * k, DVec3::Z * -k, DVec3::X * k * rng.sign());
+        let map = DAffine3::from_mat3(turn);
+        if is_ordinary(case) {
+            let inner = Affine::new(s, map).unwrap();
+            let nested = Affine::new(&inner, map.inverse()).unwrap();
+            let nested = nested.intersect(&case.ray, case.within);
+            prop_assert_eq!(hit.map(|h| (h.lambda, h.part)), nested.map(|h| (h.lambda, h.part)), "{}", family.name);
+            let outer = Ray { origin: turn * case.ray.origin, direction: turn * case.ray.direction };
+            let once = inner.intersect(&outer, case.within);
+            prop_assert_eq!(hit.map(|h| (h.lambda, h.part)), once.map(|h| (h.lambda, h.part)), "{}", family.name);
+            compared.set(compared.get() + 1);
+        }
+        Ok(hit.is_some())
+    });
+    println!("{} nested", compared.get());
     assert!(compared.get() > 1000);
 }
 
