@@ -4,9 +4,9 @@ use crate::kernel::bound::{INFLATE, U};
 use crate::kernel::cpu;
 use crate::kernel::dyadic::Dyadic;
 use crate::kernel::eft::{Fused, Product, Split, two_sum};
-use crate::kernel::number::{self, Number, Vector, cross, dot, vector};
+use crate::kernel::float::{exponent_of, ldexp, unit};
+use crate::kernel::number::{Number, Vector, cross, dot, vector};
 use crate::kernel::ratio::Ratio;
-use crate::kernel::scaled::{exponent_of, ldexp};
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -81,7 +81,7 @@ impl<S> Affine<S> {
     /// Mᵀn, a unit vector.
     fn world_normal(&self, object_normal: DVec3) -> DVec3 {
         let n = self.object_from_world.matrix3.transpose() * object_normal;
-        if n == DVec3::ZERO || !n.is_finite() { object_normal } else { number::unit_of(n) }
+        unit(n).unwrap_or(object_normal)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Pixel → ray.
 
 use crate::Ray;
+use crate::kernel::float::unit;
 use glam::{DVec2, DVec3};
 use std::fmt;
 
@@ -129,13 +130,6 @@ impl Camera {
     pub fn height(&self) -> u32 {
         self.height
     }
-}
-
-/// `v` scaled to length one, whatever its length; `None` for zero.
-fn unit(v: DVec3) -> Option<DVec3> {
-    // By its largest component first: squares of huge or tiny ones would leave the range.
-    let largest = v.abs().max_element();
-    (v / largest).try_normalize().filter(|_| largest > 0.0)
 }
 
 /// A point of [0, 1)² from a hash of the sample's name: `SplitMix64` (Steele, Lea, Flood 2014), once per coordinate.

@@ -211,7 +211,7 @@ fn normals_are_accurate_from_far_away() {
 fn every_scale_has_unit_normals_and_finite_points() {
     let mut n = 0;
     for e in [-1070, -1000, -600, -300, 0, 300, 600, 1000] {
-        let s = truehit::kernel::scaled::ldexp(1.0, e);
+        let s = truehit::kernel::float::ldexp(1.0, e);
         let shapes: [Box<dyn Shape>; 3] = [
             Box::new(Sphere::new([0.0; 3], 2.0 * s).unwrap()),
             Box::new(Cylinder::new([0.0; 3], [0.0, 0.0, 4.0 * s], 2.0 * s).unwrap()),

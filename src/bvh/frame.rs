@@ -1,7 +1,7 @@
 //! The tree's own frame, in which every coordinate is at most 1: what f32 resolves well, wherever the scene is.
 
 use crate::Aabb;
-use crate::kernel::scaled::ldexp;
+use crate::kernel::float::{exponent_of, ldexp};
 use glam::DVec3;
 
 /// x ↦ (x − `center`)·2^−`exponent`.
@@ -73,13 +73,6 @@ impl Frame {
         }
         out
     }
-}
-
-/// The exponent e with 2^e ≤ |x| < 2^(e+1); x is finite and not zero.
-#[inline]
-pub(crate) fn exponent_of(x: f64) -> i32 {
-    let field = ((x.to_bits() >> 52) & 0x7ff) as i32;
-    if field == 0 { (((x * 2f64.powi(100)).to_bits() >> 52) & 0x7ff) as i32 - 1123 } else { field - 1023 }
 }
 
 /// The largest f32 that is not above `x`; −∞ for NaN.

@@ -5,6 +5,7 @@
 //! fixed number of ulps of t, do not cover the rounding of the origin and are replaced.
 
 use super::frame::Frame;
+use crate::kernel::float::power;
 use crate::{Interval, Ray};
 use fearless_simd::{Simd, f32x4, prelude::*};
 use glam::DVec3;
@@ -173,12 +174,6 @@ fn largest(v: DVec3) -> f64 {
 #[inline(always)]
 fn exponent_of_normal(x: f64) -> i32 {
     ((x.to_bits() >> 52) & 0x7ff) as i32 - 1023
-}
-
-/// 2^e, |e| ≤ 1022.
-#[inline(always)]
-fn power(e: i32) -> f64 {
-    f64::from_bits(((e + 1023) as u64) << 52)
 }
 
 #[inline(always)]

@@ -6,6 +6,7 @@ pub mod cpu;
 pub mod dyadic;
 pub mod eft;
 mod fixed;
+pub mod float;
 pub mod frustum;
 pub mod number;
 mod pair;

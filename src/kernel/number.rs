@@ -6,7 +6,7 @@
 
 use super::bounded::Bounded;
 use super::dyadic::Dyadic;
-use super::scaled::{Scaled, exponent_of, ldexp};
+use super::scaled::Scaled;
 use glam::DVec3;
 use std::cmp::Ordering;
 
@@ -92,13 +92,6 @@ pub fn unit<N: Number>(v: &Vector<N>) -> Option<DVec3> {
         unit[i] = x;
     }
     Some(unit.normalize())
-}
-
-/// v/|v| of a finite non-zero vector of any length.
-#[must_use]
-pub fn unit_of(v: DVec3) -> DVec3 {
-    let k = -exponent_of(v.abs().max_element());
-    DVec3::from(v.to_array().map(|x| ldexp(x, k))).normalize()
 }
 
 /// The exact sign of a polynomial: by double-doubles where they can tell, exactly otherwise.

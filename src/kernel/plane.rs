@@ -6,9 +6,9 @@
 use super::bound::{LARGE, PLANE_QUOTIENT, SMALL, U, UNDERFLOW};
 use super::cpu;
 use super::eft::{Fused, Product, Split, two_diff, two_sum};
+use super::float::{exponent_of, ldexp};
 use super::number::{self, Number, difference, dot, vector};
 use super::ratio::{self, Ratio};
-use super::scaled::{exponent_of, ldexp};
 use crate::{Hit, Interval, Ray};
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;

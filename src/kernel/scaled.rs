@@ -5,6 +5,7 @@
 
 use super::dyadic::Dyadic;
 use super::eft::{Product, Split, quick_two_sum, two_sum};
+use super::float::{exponent_of, ldexp, power};
 use super::number::Number;
 
 /// (hi + lo)·2^exponent with |lo| ≤ ½ ulp(hi) and 1 ≤ |hi| ≤ 2, or zero.
@@ -181,34 +182,6 @@ impl Scaled {
     }
 }
 
-/// ⌊log₂|x|⌋ of a normal number; −1023 for a subnormal or zero.
-#[must_use]
-pub fn exponent_of(x: f64) -> i32 {
-    ((x.to_bits() >> 52) & 0x7ff) as i32 - 1023
-}
-
-/// x·2^e: exact where the range allows, rounded once where it does not.
-#[must_use]
-pub fn ldexp(x: f64, e: i32) -> f64 {
-    if x == 0.0 || !x.is_finite() {
-        return x;
-    }
-    // x = m·2^own, 1 ≤ |m| < 2: a subnormal is lifted first.
-    let (x, e) = if x.abs() < f64::MIN_POSITIVE { (x * power(100), e.saturating_sub(100)) } else { (x, e) };
-    let m = f64::from_bits(x.to_bits() & !(0x7ff << 52) | 1023 << 52);
-    match e.saturating_add(exponent_of(x)) {
-        e if e > 1023 => f64::INFINITY.copysign(x),
-        e if e >= -1022 => m * power(e),
-        // Only the last factor leaves the normal range.
-        e => m * power(-1000) * power((e + 1000).max(-200)),
-    }
-}
-
-/// 2^e, −1022 ≤ e ≤ 1023.
-fn power(e: i32) -> f64 {
-    f64::from_bits(((e + 1023) as u64) << 52)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::dyadic::Dyadic;
@@ -247,18 +220,5 @@ mod tests {
             prop_assert!(s.squared().times(&(2.1 * SCALED_ERROR).into()).minus(&error).sign() != Some(std::cmp::Ordering::Less));
         }
 
-        #[test]
-        fn ldexp_rounds_once(bits in any::<u64>(), e in -2100..2100i32) {
-            let x = f64::from_bits(bits & !(1 << 62));
-            let exact = Dyadic::from(x).shifted(e);
-            let (value, bound) = (ldexp(x, e), f64::from_bits(1) / 2.0);
-            if value.is_finite() && value.abs() >= f64::MIN_POSITIVE {
-                prop_assert!(Dyadic::from(value).minus(&exact).is_zero());
-            } else if value.is_finite() {
-                // Half the smallest subnormal is not a float: compare doubled.
-                let error = Dyadic::from(value).minus(&exact).magnitude().shifted(1);
-                prop_assert!(bound == 0.0 && Dyadic::from(f64::from_bits(1)).minus(&error).sign() != Some(std::cmp::Ordering::Less));
-            }
-        }
     }
 }

@@ -368,15 +368,15 @@ mod tests {
     /// A ray through an edge or a vertex of a closed surface crosses an even number of triangles.
     #[test]
     fn crossings_of_a_closed_surface_are_even() {
-        let p = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64);
+        let p = |i: u32| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2));
         let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let cube: Vec<[DVec3; 3]> =
             quads.iter().flat_map(|q| [[p(q[0]), p(q[1]), p(q[2])], [p(q[0]), p(q[2]), p(q[3])]]).collect();
         let (mut through, mut touching) = (0, 0);
         for i in 0..125 {
-            let target = DVec3::new((i % 5) as f64, (i / 5 % 5) as f64, (i / 25) as f64) * 0.25;
+            let target = DVec3::new(f64::from(i % 5), f64::from(i / 5 % 5), f64::from(i / 25)) * 0.25;
             for j in 0..27 {
-                let direction = DVec3::new((j % 3) as f64 - 1.0, (j / 3 % 3) as f64 - 1.0, (j / 9) as f64 - 1.0);
+                let direction = DVec3::new(f64::from(j % 3) - 1.0, f64::from(j / 3 % 3) - 1.0, f64::from(j / 9) - 1.0);
                 if direction == DVec3::ZERO {
                     continue;
                 }

@@ -1,6 +1,7 @@
 //! Where light comes from.
 
 use super::Rgb;
+use crate::kernel::float::unit;
 use crate::{Interval, Ray, Scene, Surface};
 use glam::DVec3;
 
@@ -49,8 +50,12 @@ impl Light {
     #[must_use]
     pub fn incident(&self, point: DVec3) -> Incident {
         match *self {
-            Self::Point { position, intensity } => Incident { direction: (position - point).normalize(), intensity },
-            Self::Directional { towards, intensity } => Incident { direction: towards.normalize(), intensity },
+            Self::Point { position, intensity } => {
+                Incident { direction: unit(position - point).unwrap_or(DVec3::NAN), intensity }
+            }
+            Self::Directional { towards, intensity } => {
+                Incident { direction: unit(towards).unwrap_or(DVec3::NAN), intensity }
+            }
         }
     }
 

@@ -3,6 +3,7 @@
 use super::color::Rgb;
 use super::material::{Material, Mirror, Sides};
 use super::{Light, phong};
+use crate::kernel::float::unit;
 use crate::raster::each_row;
 use crate::{Camera, Interval, Raster, Ray, Scene, Surface};
 use glam::DVec3;
@@ -64,7 +65,9 @@ impl Background {
     pub fn color(&self, direction: DVec3) -> Rgb {
         match *self {
             Self::Uniform(color) => color,
-            Self::Sky { up, horizon, zenith } => horizon.lerp(zenith, direction.normalize().dot(up).clamp(0.0, 1.0)),
+            Self::Sky { up, horizon, zenith } => {
+                horizon.lerp(zenith, unit(direction).unwrap_or(up).dot(up).clamp(0.0, 1.0))
+            }
         }
     }
 }
@@ -253,7 +256,7 @@ struct View {
 
 impl View {
     fn new(surface: &Surface<'_>, direction: DVec3) -> Self {
-        let to_camera = -direction.normalize();
+        let to_camera = -unit(direction).unwrap_or(DVec3::NAN);
         let front = to_camera.dot(surface.normal()) >= 0.0;
         let turned = |n: DVec3| if front { n } else { -n };
         Self { to_camera, front, facet: turned(surface.normal()), normal: turned(surface.shading_normal()) }

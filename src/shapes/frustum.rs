@@ -1,8 +1,9 @@
 //! What cylinder, cone and truncated cone have in common: the capped frustum.
 
-use super::local::{Local, around, length, unit};
+use super::local::{Local, around, length};
 use super::patch::Patch;
 use crate::kernel::bound::U;
+use crate::kernel::float::unit;
 use crate::kernel::frustum::{self, BASE, TOP};
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, SurfacePoint};
 use glam::{DVec2, DVec3};

@@ -2,7 +2,7 @@
 
 use crate::Ray;
 use crate::kernel::eft::{Product, Split, two_diff, two_sum};
-use crate::kernel::scaled::ldexp;
+use crate::kernel::float::{exponent_of, ldexp};
 use glam::DVec3;
 
 /// Lengths are divided by 2^exponent, so that squares neither overflow nor vanish.
@@ -15,7 +15,7 @@ impl Local {
     /// For lengths up to `largest`; none are changed unless they are extreme.
     pub(super) fn new(largest: f64) -> Self {
         let ordinary = 1e-90..1e90;
-        Self { exponent: if ordinary.contains(&largest) { 0 } else { exponent(largest) } }
+        Self { exponent: if ordinary.contains(&largest) { 0 } else { exponent_of(largest) } }
     }
 
     /// A length in local units.
@@ -42,7 +42,7 @@ impl Local {
     pub(super) fn offset(self, ray: &Ray, lambda: [f64; 2], from: DVec3) -> DVec3 {
         let (o, from) = (self.vector(ray.origin), self.vector(from));
         let longest = ray.direction.abs().max_element();
-        let step = if (1e-150..1e150).contains(&longest) { 0 } else { exponent(longest) };
+        let step = if (1e-150..1e150).contains(&longest) { 0 } else { exponent_of(longest) };
         let d = if step == 0 { ray.direction } else { ray.direction.map(|x| scaled(x, -step)) };
         let [l, rest] = lambda.map(|l| scaled(l, step - self.exponent));
         let component = |i: usize| {
@@ -55,29 +55,10 @@ impl Local {
     }
 }
 
-/// `v` over its length, whatever that is; `None` for zero, infinite or NaN.
-pub(super) fn unit(v: DVec3) -> Option<DVec3> {
-    let longest = v.abs().max_element();
-    if !(longest > 0.0 && longest.is_finite() && v.is_finite()) {
-        return None;
-    }
-    let v = if (1e-100..1e100).contains(&longest) { v } else { v.map(|x| scaled(x, -exponent(longest))) };
-    Some(v / v.length())
-}
-
 /// |v|, whatever its range.
 pub(super) fn length(v: DVec3) -> f64 {
     let local = Local::new(v.abs().max_element());
     local.outside(local.vector(v).length())
-}
-
-/// e with 2^e ≤ x < 2^(e + 1); 0 for 0.
-fn exponent(x: f64) -> i32 {
-    match ((x.to_bits() >> 52) & 0x7ff) as i32 {
-        0 if x == 0.0 => 0,
-        0 => -1074 + (63 - x.to_bits().leading_zeros() as i32),
-        e => e - 1023,
-    }
 }
 
 fn scaled(x: f64, e: i32) -> f64 {
@@ -97,15 +78,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn units_and_lengths_have_no_range() {
+    fn lengths_have_no_range() {
         for e in [-1074, -1000, -540, 0, 540, 1000] {
             let v = DVec3::new(3.0, 0.0, 4.0).map(|x| ldexp(x, e));
             assert_eq!(length(v), ldexp(5.0, e), "{e}");
-            let u = unit(v).unwrap();
-            assert!((u - DVec3::new(0.6, 0.0, 0.8)).length() < 1e-15, "{e}: {u}");
         }
-        assert_eq!(unit(DVec3::ZERO), None);
-        assert_eq!(unit(DVec3::new(f64::NAN, 1.0, 0.0)), None);
+        assert_eq!(length(DVec3::ZERO), 0.0);
     }
 
     #[test]

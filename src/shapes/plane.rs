@@ -1,4 +1,6 @@
-use crate::kernel::{eft, number, plane};
+//! The plane.
+
+use crate::kernel::{eft, float, plane};
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
@@ -39,10 +41,7 @@ impl Plane {
                 return Err(InvalidShape::NotFinite { field });
             }
         }
-        if normal == DVec3::ZERO {
-            return Err(InvalidShape::ZeroVector { field: "normal" });
-        }
-        let unit = number::unit_of(normal);
+        let unit = float::unit(normal).ok_or(InvalidShape::ZeroVector { field: "normal" })?;
         Ok(Self { point, normal, unit, tangents: tangents(unit) })
     }
 }

@@ -1,7 +1,9 @@
+//! The planar polygon.
+
 use super::plane::tangents;
 use crate::kernel::bound::U;
 use crate::kernel::polygon::{self, Contours};
-use crate::kernel::{eft, number, plane};
+use crate::kernel::{eft, float, plane};
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DAffine3, DVec2, DVec3};
 use std::cmp::Ordering;
@@ -80,7 +82,7 @@ impl Polygon {
                 thickness = f64::max(thickness, distance);
             }
         }
-        let normal = number::unit_of(contours.normal()[0]);
+        let normal = float::unit(contours.normal()[0]).unwrap_or(DVec3::Z);
         let tangents = tangents(normal);
         let flat = contours.vertices().iter().map(|&v| planar(tangents, v - outer[0]));
         let (low, high) = flat.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));

@@ -1,8 +1,8 @@
 //! The sphere.
 
-use super::local::{Local, around, length, unit};
+use super::local::{Local, around, length};
 use super::patch::Patch;
-use crate::kernel::{bound::U, sphere};
+use crate::kernel::{bound::U, float::unit, sphere};
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};

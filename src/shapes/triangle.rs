@@ -1,3 +1,5 @@
+//! The triangle.
+
 use crate::kernel::triangle;
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DAffine3, DVec3};

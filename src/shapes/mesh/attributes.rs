@@ -1,6 +1,7 @@
 //! What is interpolated over a triangle.
 
 use crate::kernel::bound::U;
+use crate::kernel::float::unit;
 use glam::{DVec2, DVec3};
 
 /// The three barycentric weights, none negative.
@@ -22,5 +23,5 @@ pub(super) fn blended_normal(corners: &[DVec3; 3], uv: DVec2) -> Option<DVec3> {
     if sum.abs().max_element() <= 64.0 * U {
         return None;
     }
-    (sum / sum.abs().max_element()).try_normalize()
+    unit(sum)
 }

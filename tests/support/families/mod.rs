@@ -111,7 +111,7 @@ fn scaled_solid(solid: Solid, k: i32) -> Solid {
 }
 
 fn ldexp(x: f64, k: i32) -> f64 {
-    truehit::kernel::scaled::ldexp(x, k)
+    truehit::kernel::float::ldexp(x, k)
 }
 
 /// Coordinates times 2^k, direction times 2^l.
