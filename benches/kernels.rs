@@ -41,6 +41,9 @@ fn triangles(distance: f64, spread: f64) -> Vec<Case> {
 }
 
 fn each<T>(group: &mut BenchmarkGroup<WallTime>, name: &str, cases: &[T], f: impl Fn(&T) -> Option<Hit>) {
+    // Rays that all miss would measure an early way out.
+    let hits = cases.iter().filter(|c| f(c).is_some()).count();
+    assert!(5 * hits > cases.len(), "{name}: {hits} of {} rays hit", cases.len());
     group.throughput(Throughput::Elements(cases.len() as u64));
     let sum = |cases: &[T]| cases.iter().filter_map(&f).map(|hit| hit.lambda).sum::<f64>();
     group.bench_function(name, |b| b.iter(|| sum(black_box(cases))));
