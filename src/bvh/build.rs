@@ -1,243 +1,207 @@
-//! The binary tree: binned surface area heuristic, top down (Wald 2007), in place and deterministic at any number of
-//! threads.
+//! The binary tree: surface area heuristic, top down, in place and deterministic at any number of threads.
 
 use super::frame::Frame;
+use super::level::Level;
+use super::split::{self, Split};
+use super::tasks;
 use crate::Aabb;
+use fearless_simd::{Simd, dispatch, f32x4, f32x8, prelude::*};
 
-/// An object's box in the frame; four lanes, so that a box is two vectors. The fourth of `max` is the object's number.
+/// An object's box in the frame. The last lanes hold the lower and the upper half of its number, as numbers: as bits
+/// they would be subnormals, whose arithmetic is slow even where nobody wants its result.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Item {
-    min: [f32; 4],
-    max: [f32; 4],
-}
+pub(super) struct Item(pub(super) Box8);
 
 impl Item {
-    pub(crate) fn index(&self) -> u32 {
-        self.max[3].to_bits()
+    fn new(frame: &Frame, bounds: &Aabb, index: usize) -> Self {
+        let ([x, y, z], [u, v, w]) = frame.outward(bounds);
+        let (low, high) = ((index & 0xffff) as f32, (index >> 16 & 0xffff) as f32);
+        Self(Box8([x, y, z, low, -u, -v, -w, high]))
+    }
+
+    pub(super) fn index(&self) -> u32 {
+        self.0.0[3] as u32 | (self.0.0[7] as u32) << 16
+    }
+
+    /// Twice the centre; NaN for an infinite box.
+    #[inline(always)]
+    pub(super) fn middle<S: Simd>(&self, simd: S) -> f32x4<S> {
+        let [x, y, z, i, u, v, w, j] = self.0.0;
+        let (least, most): (f32x4<S>, f32x4<S>) = ([x, y, z, i].simd_into(simd), [u, v, w, j].simd_into(simd));
+        least - most
     }
 }
 
-/// A node of the binary tree. A leaf holds `count` items from `first`; an inner node (`count` = 0) has its left child
-/// behind itself and its right child at `first`.
+/// A box in f32: x, y, z of its least corner, anything, and those of its greatest corner negated, anything. So growing
+/// it is one minimum.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Node {
-    pub(crate) min: [f32; 3],
-    pub(crate) first: u32,
-    pub(crate) max: [f32; 3],
-    pub(crate) count: u32,
+#[repr(C, align(32))]
+pub(super) struct Box8([f32; 8]);
+
+impl Box8 {
+    pub(super) const EMPTY: Self = Self([f32::INFINITY; 8]);
+
+    #[inline(always)]
+    pub(super) fn grow<S: Simd>(&mut self, simd: S, other: &Self) {
+        let (a, b): (f32x8<S>, f32x8<S>) = (self.0.simd_into(simd), other.0.simd_into(simd));
+        self.0 = a.min(b).into();
+    }
+
+    #[inline(always)]
+    pub(super) fn around<S: Simd>(simd: S, items: &[Item]) -> Self {
+        let mut b = Self::EMPTY;
+        for i in items {
+            b.grow(simd, &i.0);
+        }
+        b
+    }
+
+    /// Half the surface.
+    #[inline(always)]
+    pub(super) fn half_area(&self) -> f32 {
+        let [x, y, z, _, u, v, w, _] = self.0;
+        let (x, y, z) = (x + u, y + v, z + w);
+        x * y + y * z + z * x
+    }
+
+    fn corners(&self) -> ([f32; 3], [f32; 3]) {
+        let [x, y, z, _, u, v, w, _] = self.0;
+        ([x, y, z], [-u, -v, -w])
+    }
 }
 
-/// The binary tree; `nodes[0]` is the root unless there are no items.
+/// A node of the binary tree. A leaf holds `count` items from `first`; an inner node (`count` = 0) has its children at
+/// `first` and `first` + 1.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Node {
+    pub(super) min: [f32; 3],
+    pub(super) first: u32,
+    pub(super) max: [f32; 3],
+    pub(super) count: u32,
+}
+
+impl Node {
+    const VACANT: Self = Self { min: [0.0; 3], first: 0, max: [0.0; 3], count: 0 };
+
+    #[inline(always)]
+    pub(super) fn is_leaf(&self) -> bool {
+        self.count > 0
+    }
+
+    #[inline(always)]
+    pub(super) fn half_area(&self) -> f32 {
+        half_area(&self.min, &self.max)
+    }
+}
+
+/// Half the surface of a box; infinite boxes have a large finite one, so that sums stay comparable.
+#[inline(always)]
+pub(super) fn half_area(min: &[f32; 3], max: &[f32; 3]) -> f32 {
+    let side = |i: usize| if max[i] - min[i] < 1e9 { max[i] - min[i] } else { 1e9 };
+    let (x, y, z) = (side(0), side(1), side(2));
+    x * y + y * z + z * x
+}
+
+/// The binary tree; `nodes[0]` is the root, slot 1 is vacant, and siblings lie in pairs from slot 2 on. No nodes if
+/// there are no items.
 #[derive(Debug)]
-pub(crate) struct Binary {
-    pub(crate) frame: Frame,
-    pub(crate) items: Vec<Item>,
-    pub(crate) nodes: Vec<Node>,
+pub(super) struct Binary {
+    pub(super) frame: Frame,
+    pub(super) items: Vec<Item>,
+    pub(super) nodes: Vec<Node>,
 }
 
-const BINS: usize = 16;
-/// Below this depth items are halved by number, which ends within 32 more levels.
-const DEEPEST_SAH: u32 = 64;
-/// Fewer items than this are not worth a thread.
-#[cfg(feature = "rayon")]
-const PARALLEL: usize = 4096;
-/// What entering an inner node costs, in tests of a leaf.
-const NODE_COST: f32 = 0.4;
+/// The deepest leaf of a tree from `Binary::new`.
+pub(super) const DEEPEST: u32 = 1 + split::DEEPEST_SAH + 32;
 
-/// Builds the tree over objects 0..count with the boxes given, with at most `leaf` of them in a leaf.
-pub(crate) fn build(count: usize, bounds: &(dyn Fn(usize) -> Aabb + Sync), leaf: usize) -> Binary {
-    assert!(count < 1 << 31, "{count} objects are too many for one tree");
-    let mut whole = Aabb::EMPTY;
-    for i in 0..count {
-        let b = bounds(i);
-        if !b.is_empty() && b.is_finite() {
-            whole = whole.union(b);
+/// Fewer items than this are not worth a thread.
+const PARALLEL: usize = 4096;
+
+impl Binary {
+    /// The tree over objects 0..count, whose boxes, if finite, lie in `whole`.
+    pub(super) fn new(count: usize, whole: Aabb, bounds: &(impl Fn(usize) -> Aabb + Sync), leaf: u32) -> Self {
+        assert!(count < 1 << 31, "{count} objects are too many for one tree");
+        let frame = Frame::around(whole);
+        // An item of no number stands for a box that holds nothing.
+        let mut items = tasks::map(count, |i| {
+            let b = bounds(i);
+            let holds_nothing = b.is_empty() && !b.min.is_nan() && !b.max.is_nan();
+            Item::new(&frame, &b, if holds_nothing { u32::MAX as usize } else { i })
+        });
+        items.retain(|i| i.index() != u32::MAX);
+        // Those of infinite size last.
+        let infinite = |i: &Item| i.0.half_area() == f32::INFINITY;
+        let finite = items.len() - items.iter().filter(|i| infinite(i)).count();
+        if finite < items.len() {
+            items.sort_by_key(infinite);
         }
-    }
-    let frame = Frame::around(whole);
-    let mut items = Vec::with_capacity(count);
-    for i in 0..count {
-        let b = bounds(i);
-        let holds_nothing = b.is_empty() && !b.min.is_nan() && !b.max.is_nan();
-        if !holds_nothing {
-            let (min, max) = frame.outward(&b);
-            let (min, max) = ([min[0], min[1], min[2], 0.0], [max[0], max[1], max[2], f32::from_bits(i as u32)]);
-            items.push(Item { min, max });
+        let mut nodes = vec![Node::VACANT; 2 * items.len()];
+        if !items.is_empty() {
+            let (root, slots) = nodes.split_at_mut(2);
+            let builder = Builder { level: Level::detect(), leaf, unit: unit(leaf) };
+            let around = |items: &[Item]| dispatch!(builder.level.token(), simd => Box8::around(simd, items));
+            let at = Place { item: 0, slot: 2, depth: 0 };
+            root[0] = if 0 < finite && finite < items.len() {
+                let (left, right) = items.split_at(finite);
+                let (left, right) = (around(left), around(right));
+                builder.inner(&mut items, slots, right, at, &Split { mid: finite, left, right })
+            } else {
+                let bounds = around(&items);
+                builder.subdivide(&mut items, slots, bounds, at)
+            };
         }
+        Self { frame, items, nodes }
     }
-    let vacant = Node { min: [0.0; 3], first: 0, max: [0.0; 3], count: 0 };
-    let mut nodes = vec![vacant; (2 * items.len()).saturating_sub(1)];
-    if !items.is_empty() {
-        let bounds = Box3::around(&items);
-        subdivide(&mut items, &mut nodes, bounds, Place { item: 0, node: 0, depth: 0 }, leaf);
-    }
-    Binary { frame, items, nodes }
+}
+
+/// So few items are not split any further: the collapse puts them into leaves as they are, or together with their
+/// neighbours. Smaller units make better trees in less full leaves, and take longer.
+fn unit(leaf: u32) -> usize {
+    (leaf as usize * 3 / 4).max(1)
+}
+
+#[derive(Clone, Copy)]
+struct Builder {
+    level: Level,
+    leaf: u32,
+    unit: usize,
 }
 
 #[derive(Clone, Copy)]
 struct Place {
     item: u32,
-    node: u32,
+    slot: u32,
     depth: u32,
 }
 
-/// A box in f32 being grown; plain comparisons, so that NaN never enters and the compiler uses vector minima.
-#[derive(Clone, Copy, Debug)]
-struct Box3 {
-    min: [f32; 4],
-    max: [f32; 4],
-}
-
-impl Box3 {
-    const EMPTY: Self = Self { min: [f32::INFINITY; 4], max: [f32::NEG_INFINITY; 4] };
-
-    #[inline(always)]
-    fn grow(&mut self, min: &[f32; 4], max: &[f32; 4]) {
-        for i in 0..4 {
-            self.min[i] = if min[i] < self.min[i] { min[i] } else { self.min[i] };
-            self.max[i] = if max[i] > self.max[i] { max[i] } else { self.max[i] };
+impl Builder {
+    /// The subtree over `items`; the nodes below its root go to `slots`, at most 2·n − 2 of them.
+    fn subdivide(self, items: &mut [Item], slots: &mut [Node], bounds: Box8, at: Place) -> Node {
+        if items.len() <= self.unit {
+            let (min, max) = bounds.corners();
+            return Node { min, first: at.item, max, count: items.len() as u32 };
         }
+        let split = dispatch!(self.level.token(), simd => split::split(simd, items, at.depth, self.leaf));
+        self.inner(items, slots, bounds, at, &split)
     }
 
-    #[inline(always)]
-    fn half_area(&self) -> f32 {
-        half_area(&three(self.min), &three(self.max))
+    fn inner(self, items: &mut [Item], slots: &mut [Node], bounds: Box8, at: Place, split: &Split) -> Node {
+        let parallel = items.len() >= PARALLEL;
+        let &Split { mid, left, right } = split;
+        let (pair, rest) = slots.split_at_mut(2);
+        let (before, after) = rest.split_at_mut(2 * mid - 2);
+        let (lower, upper) = items.split_at_mut(mid);
+        let left_at = Place { item: at.item, slot: at.slot + 2, depth: at.depth + 1 };
+        let right_at = Place { item: at.item + mid as u32, slot: at.slot + 2 * mid as u32, depth: at.depth + 1 };
+        let (l, r) = tasks::join(
+            parallel,
+            || self.subdivide(lower, before, left, left_at),
+            || self.subdivide(upper, after, right, right_at),
+        );
+        pair[0] = l;
+        pair[1] = r;
+        let (min, max) = bounds.corners();
+        Node { min, first: at.slot, max, count: 0 }
     }
-
-    fn around(items: &[Item]) -> Self {
-        let mut b = Self::EMPTY;
-        for i in items {
-            b.grow(&i.min, &i.max);
-        }
-        b
-    }
-}
-
-fn three([x, y, z, _]: [f32; 4]) -> [f32; 3] {
-    [x, y, z]
-}
-
-/// Half the surface of a box; infinite boxes have a large finite one, so that sums stay comparable.
-#[inline(always)]
-pub(crate) fn half_area(min: &[f32; 3], max: &[f32; 3]) -> f32 {
-    let side = |i: usize| (max[i] - min[i]).clamp(0.0, 1e9);
-    let (x, y, z) = (side(0), side(1), side(2));
-    x * y + y * z + z * x
-}
-
-/// Twice the centre, kept finite.
-#[inline(always)]
-fn middle(item: &Item, axis: usize) -> f32 {
-    let sum = item.min[axis] + item.max[axis];
-    if sum.abs() <= 4.0 { sum } else { 0.0 }
-}
-
-fn subdivide(items: &mut [Item], nodes: &mut [Node], bounds: Box3, at: Place, leaf: usize) {
-    let n = items.len();
-    let (min, max) = (three(bounds.min), three(bounds.max));
-    let Some((mid, left, right)) = split(items, &bounds, at.depth, leaf) else {
-        nodes[0] = Node { min, first: at.item, max, count: n as u32 };
-        return;
-    };
-    let (node, rest) = nodes.split_at_mut(1);
-    let (before, after) = rest.split_at_mut(2 * mid - 1);
-    let (lower, upper) = items.split_at_mut(mid);
-    let left_at = Place { item: at.item, node: at.node + 1, depth: at.depth + 1 };
-    let right_at = Place { item: at.item + mid as u32, node: at.node + 2 * mid as u32, depth: at.depth + 1 };
-    node[0] = Node { min, first: right_at.node, max, count: 0 };
-    let mut first = || subdivide(lower, before, left, left_at, leaf);
-    let mut second = || subdivide(upper, after, right, right_at, leaf);
-    #[cfg(feature = "rayon")]
-    if n >= PARALLEL {
-        rayon::join(first, second);
-        return;
-    }
-    first();
-    second();
-}
-
-#[derive(Clone, Copy)]
-struct Bin {
-    bounds: Box3,
-    count: u32,
-}
-
-/// Reorders the items into two parts: the number in the first, and their boxes. `None` if they should be one leaf.
-fn split(items: &mut [Item], bounds: &Box3, depth: u32, leaf: usize) -> Option<(usize, Box3, Box3)> {
-    let n = items.len();
-    if n == 1 {
-        return None;
-    }
-    let halve = |items: &mut [Item]| {
-        let (a, b) = items.split_at(n / 2);
-        Some((n / 2, Box3::around(a), Box3::around(b)))
-    };
-    let mut centers = Box3::EMPTY;
-    for i in &*items {
-        let m = [middle(i, 0), middle(i, 1), middle(i, 2), 0.0];
-        centers.grow(&m, &m);
-    }
-    let mut scale = [0.0f32; 3];
-    for (axis, scale) in scale.iter_mut().enumerate() {
-        let extent = centers.max[axis] - centers.min[axis];
-        // Just below BINS, so that the largest centre falls into the last bin. Subnormal extents divide to infinity.
-        let s = BINS as f32 * (1.0 - 1e-6) / extent;
-        *scale = if extent > 0.0 && s.is_finite() { s } else { 0.0 };
-    }
-    if scale == [0.0; 3] || depth >= DEEPEST_SAH {
-        return if n <= leaf { None } else { halve(items) };
-    }
-    let bin_of =
-        |item: &Item, axis: usize| (((middle(item, axis) - centers.min[axis]) * scale[axis]) as usize).min(BINS - 1);
-    let mut bins = [[Bin { bounds: Box3::EMPTY, count: 0 }; BINS]; 3];
-    for item in &*items {
-        for (axis, bins) in bins.iter_mut().enumerate() {
-            let bin = &mut bins[bin_of(item, axis)];
-            bin.count += 1;
-            bin.bounds.grow(&item.min, &item.max);
-        }
-    }
-    // A leaf is tested as one, however many lanes it fills.
-    let leaves = |count: u32| count.div_ceil(leaf as u32) as f32;
-    let mut best = (f32::INFINITY, 0, 0);
-    for axis in (0..3).filter(|&a| scale[a] > 0.0) {
-        let bins = &bins[axis];
-        let mut costs = [0.0f32; BINS];
-        let (mut b, mut count) = (Box3::EMPTY, 0);
-        for i in (1..BINS).rev() {
-            b.grow(&bins[i].bounds.min, &bins[i].bounds.max);
-            count += bins[i].count;
-            costs[i] = if count == 0 { f32::INFINITY } else { b.half_area() * leaves(count) };
-        }
-        let (mut b, mut count) = (Box3::EMPTY, 0);
-        for i in 1..BINS {
-            b.grow(&bins[i - 1].bounds.min, &bins[i - 1].bounds.max);
-            count += bins[i - 1].count;
-            let cost = if count == 0 { f32::INFINITY } else { b.half_area() * leaves(count) + costs[i] };
-            if cost < best.0 {
-                best = (cost, axis, i);
-            }
-        }
-    }
-    let area = bounds.half_area();
-    if n <= leaf && best.0 + NODE_COST * area >= area {
-        return None;
-    }
-    let (_, axis, boundary) = best;
-    if boundary == 0 {
-        return halve(items);
-    }
-    let (mut left, mut right) = (Box3::EMPTY, Box3::EMPTY);
-    let (mut i, mut j) = (0, n);
-    while i < j {
-        if bin_of(&items[i], axis) < boundary {
-            left.grow(&items[i].min, &items[i].max);
-            i += 1;
-        } else {
-            j -= 1;
-            right.grow(&items[i].min, &items[i].max);
-            items.swap(i, j);
-        }
-    }
-    Some((i, left, right))
 }

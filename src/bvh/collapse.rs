@@ -1,139 +1,164 @@
-//! From the binary tree to nodes of eight: the child with the largest surface is opened until there are eight.
+//! From the binary tree to nodes of eight: the cut of least cost by dynamic programming (Ylitie, Karras, Laine 2017).
 
-use super::build::{Binary, Item, Node, half_area};
-use super::wide::{LEAF, NONE, Wide, WideNode};
+use super::build::{Binary, Item, Node};
+use super::reinsert;
+use super::wide::{LEAF, Wide, WideNode};
+use crate::Aabb;
 
-impl Wide {
-    /// Packs `binary`; reorders its items so that leaf i's come before leaf i + 1's, and its nodes' `first` with them.
-    pub(crate) fn collapse(binary: &Binary) -> Self {
-        let mut nodes = vec![WideNode::EMPTY];
-        if !binary.nodes.is_empty() {
-            let sizes = binary.sizes();
-            // (binary node, wide node to fill)
-            let mut work = vec![(0u32, 0u32)];
-            while let Some((from, to)) = work.pop() {
-                let (mut children, count) = open(&binary.nodes, from);
-                // Any-hit queries take the lanes in turn: where there is least to test first.
-                children[..count].sort_by_key(|&c| sizes[c as usize]);
-                let mut wide = WideNode::EMPTY;
-                let first = nodes.len() as u32;
-                let mut inner = 0;
-                for (lane, &child) in children[..count].iter().enumerate() {
-                    let node = &binary.nodes[child as usize];
-                    for axis in 0..3 {
-                        wide.rows[axis][lane] = node.min[axis];
-                        wide.rows[axis + 3][lane] = node.max[axis];
-                    }
-                    let word = if node.count > 0 {
-                        // Numbered later, in the order of the items.
-                        LEAF | node.first
-                    } else {
-                        nodes.push(WideNode::EMPTY);
-                        inner += 1;
-                        first + inner - 1
-                    };
-                    wide.set_child(lane, word);
-                }
-                for lane in (0..count).rev() {
-                    if wide.child(lane) & LEAF == 0 {
-                        work.push((children[lane], wide.child(lane)));
-                    }
-                }
-                nodes[to as usize] = wide;
-            }
-            number_leaves(&mut nodes, binary.items.len());
-        }
-        nodes.shrink_to_fit();
-        Self { frame: binary.frame, nodes }
-    }
-}
-
-/// Leaves are known by their first item so far; the items' order, which is depth-first, gives them their numbers.
-fn number_leaves(nodes: &mut [WideNode], items: usize) {
-    let is_leaf = |c: u32| c != NONE && c & LEAF != 0;
-    let mut number = vec![0u32; items];
-    for n in &*nodes {
-        for c in (0..8).map(|lane| n.child(lane)).filter(|&c| is_leaf(c)) {
-            number[(c & !LEAF) as usize] = 1;
-        }
-    }
-    let mut count = 0;
-    for n in &mut number {
-        let starts = *n;
-        *n = count;
-        count += starts;
-    }
-    for n in nodes {
-        for lane in 0..8 {
-            let c = n.child(lane);
-            if is_leaf(c) {
-                n.set_child(lane, LEAF | number[(c & !LEAF) as usize]);
-            }
-        }
-    }
-}
-
-/// The up to eight descendants of `from` that become one node's children; a leaf is its own.
-fn open(nodes: &[Node], from: u32) -> ([u32; 8], usize) {
-    let mut children = [from; 8];
-    let mut count = 1;
-    while count < 8 {
-        let area = |&c: &u32| {
-            let n = &nodes[c as usize];
-            if n.count > 0 { -1.0 } else { half_area(&n.min, &n.max) }
-        };
-        let (mut widest, mut most) = (0, -1.0);
-        for (i, c) in children[..count].iter().enumerate() {
-            let a = area(c);
-            if a > most {
-                (widest, most) = (i, a);
-            }
-        }
-        if most < 0.0 {
-            break;
-        }
-        let opened = children[widest];
-        children[widest] = opened + 1;
-        children[count] = nodes[opened as usize].first;
-        count += 1;
-    }
-    (children, count)
-}
-
-impl Binary {
-    /// The number of items below each node.
-    fn sizes(&self) -> Vec<u32> {
-        let mut sizes = vec![0; self.nodes.len()];
-        // Children lie behind their parents.
-        for (i, node) in self.nodes.iter().enumerate().rev() {
-            sizes[i] = match node {
-                Node { count: 0, first, .. } if *first as usize > i => sizes[i + 1] + sizes[*first as usize],
-                node => node.count,
-            };
-        }
-        sizes
-    }
-
+/// A tree and what its leaves hold.
+#[derive(Debug)]
+pub(crate) struct Built {
+    pub(crate) tree: Wide,
     /// The objects in the order of the leaves.
-    pub(crate) fn order(&self) -> Vec<u32> {
-        self.items.iter().map(Item::index).collect()
+    pub(crate) objects: Vec<u32>,
+    /// Leaf i holds `objects[starts[i]..starts[i + 1]]`.
+    pub(crate) starts: Vec<u32>,
+}
+
+/// The tree over objects 0..count with the boxes given, which lie in `whole` if they are finite, with at most `leaf` of
+/// them in a leaf.
+pub(crate) fn build(count: usize, whole: Aabb, bounds: &(impl Fn(usize) -> Aabb + Sync), leaf: u32) -> Built {
+    let mut binary = Binary::new(count, whole, bounds, leaf);
+    reinsert::reinsert(&mut binary.nodes);
+    Plan::new(&binary, leaf).collapse(&binary)
+}
+
+/// What becomes of each binary node.
+struct Plan {
+    /// Items below.
+    sizes: Vec<u32>,
+    /// Three bits for each number of lanes 2–8: how many of them the left child gets, or 0 for one lane fewer; and
+    /// [`AS_LEAF`].
+    choices: Vec<u32>,
+    leaf: u32,
+}
+
+const AS_LEAF: u32 = 1;
+
+fn lanes_of_left(choices: u32, lanes: usize) -> usize {
+    (choices >> (3 * lanes) & 7) as usize
+}
+
+impl Plan {
+    fn new(binary: &Binary, leaf: u32) -> Self {
+        let n = binary.nodes.len();
+        let mut plan = Self { sizes: vec![0; n], choices: vec![0; n], leaf };
+        if n > 0 {
+            plan.costs(&binary.nodes, 0);
+        }
+        plan
     }
 
-    /// Where each leaf's items start, in order, and the end.
-    pub(crate) fn leaf_starts(&self) -> Vec<u32> {
-        let mut starts = Vec::new();
-        if !self.nodes.is_empty() {
-            let mut work = vec![0u32];
-            while let Some(i) = work.pop() {
-                let node = &self.nodes[i as usize];
-                if node.count > 0 {
-                    starts.push(node.first);
-                } else {
-                    work.extend([node.first, i + 1]);
+    /// The least cost of node `at` in up to 1, 2, … 7 lanes.
+    fn costs(&mut self, nodes: &[Node], at: u32) -> [f32; 7] {
+        let node = &nodes[at as usize];
+        let area = node.half_area();
+        if node.is_leaf() {
+            self.sizes[at as usize] = node.count;
+            self.choices[at as usize] = AS_LEAF;
+            return [area; 7];
+        }
+        let l = self.costs(nodes, node.first);
+        let r = self.costs(nodes, node.first + 1);
+        let size = self.sizes[node.first as usize] + self.sizes[node.first as usize + 1];
+        self.sizes[at as usize] = size;
+        let mut choices = 0u32;
+        let mut costs = [0.0f32; 9];
+        for lanes in 2..=8usize {
+            let mut best = (f32::INFINITY, 0);
+            for k in 1..lanes {
+                let c = l[k - 1] + r[lanes - k - 1];
+                if c < best.0 {
+                    best = (c, k);
                 }
             }
+            costs[lanes] = best.0;
+            choices |= (best.1 as u32) << (3 * lanes);
         }
-        starts.push(self.items.len() as u32);
-        starts
+        let inner = costs[8] + area;
+        let leaf = if size <= self.leaf { area } else { f32::INFINITY };
+        if leaf <= inner {
+            choices |= AS_LEAF;
+        }
+        costs[1] = leaf.min(inner);
+        for lanes in 2..=7usize {
+            if costs[lanes - 1] <= costs[lanes] {
+                costs[lanes] = costs[lanes - 1];
+                choices &= !(7 << (3 * lanes));
+            }
+        }
+        self.choices[at as usize] = choices;
+        std::array::from_fn(|i| costs[i + 1])
+    }
+
+    fn expand(&self, nodes: &[Node], at: u32, mut lanes: usize, children: &mut Vec<u32>) {
+        let choices = self.choices[at as usize];
+        while lanes > 1 && lanes_of_left(choices, lanes) == 0 {
+            lanes -= 1;
+        }
+        if lanes == 1 {
+            children.push(at);
+            return;
+        }
+        let (first, k) = (nodes[at as usize].first, lanes_of_left(choices, lanes));
+        self.expand(nodes, first, k, children);
+        self.expand(nodes, first + 1, lanes - k, children);
+    }
+
+    fn collapse(&self, binary: &Binary) -> Built {
+        let mut wide_nodes = vec![WideNode::EMPTY];
+        let (mut objects, mut starts) = (Vec::with_capacity(binary.items.len()), Vec::new());
+        let mut children = Vec::new();
+        let mut below = Vec::new();
+        let mut work = Vec::new();
+        if !binary.nodes.is_empty() {
+            // (binary node, wide node to fill)
+            work.push((0u32, 0u32));
+        }
+        while let Some((from, to)) = work.pop() {
+            children.clear();
+            if self.choices[from as usize] & AS_LEAF != 0 {
+                children.push(from);
+            } else {
+                self.expand(&binary.nodes, from, 8, &mut children);
+            }
+            // Any-hit queries take the lanes in turn: where there is least to test first.
+            children.sort_by_key(|&c| self.sizes[c as usize]);
+            let mut wide = WideNode::EMPTY;
+            let inner_from = work.len();
+            for (lane, &child) in children.iter().enumerate() {
+                let node = &binary.nodes[child as usize];
+                for axis in 0..3 {
+                    wide.rows[axis][lane] = node.min[axis];
+                    wide.rows[axis + 3][lane] = node.max[axis];
+                }
+                let word = if self.choices[child as usize] & AS_LEAF != 0 {
+                    let number = starts.len() as u32;
+                    starts.push(objects.len() as u32);
+                    below.push(child);
+                    while let Some(i) = below.pop() {
+                        let node = &binary.nodes[i as usize];
+                        if node.is_leaf() {
+                            let items = &binary.items[node.first as usize..][..node.count as usize];
+                            objects.extend(items.iter().map(Item::index));
+                        } else {
+                            below.extend([node.first + 1, node.first]);
+                        }
+                    }
+                    LEAF | number
+                } else {
+                    let number = wide_nodes.len() as u32;
+                    wide_nodes.push(WideNode::EMPTY);
+                    work.push((child, number));
+                    number
+                };
+                wide.set_child(lane, word);
+            }
+            work[inner_from..].reverse();
+            wide_nodes[to as usize] = wide;
+        }
+        starts.push(objects.len() as u32);
+        wide_nodes.shrink_to_fit();
+        Built { tree: Wide { frame: binary.frame, nodes: wide_nodes }, objects, starts }
     }
 }

@@ -1,7 +1,7 @@
 //! A tree of boxes that knows no shapes: objects are numbers with a box each, leaves call closures.
 //!
-//! `build` makes a binary tree by the surface area heuristic, `collapse` packs it into nodes of eight f32 boxes,
-//! `traverse` walks it front to back with one ray. Boxes are rounded outward into the frame of `frame`, and the ray's
+//! `build` makes a binary tree by the surface area heuristic (`split`), `reinsert` moves what lies badly, `collapse` packs
+//! the tree into nodes of eight f32 boxes, `traverse` walks it front to back with one ray. Boxes are rounded outward into the frame of `frame`, and the ray's
 //! constants in `slab` carry margins for every rounding between the f64 ray and the f32 boxes: no box that holds a
 //! point of the ray is skipped (docs/numerics.md §10).
 
@@ -9,15 +9,21 @@ mod build;
 mod collapse;
 mod frame;
 mod level;
+#[cfg(test)]
+mod quality;
+mod reinsert;
 mod slab;
+mod split;
+mod tasks;
 mod traverse;
 mod wide;
 
 pub use level::Level;
 
-pub(crate) use build::build;
+pub(crate) use collapse::build;
 pub(crate) use frame::Frame;
 pub(crate) use slab::LocalRay;
+pub(crate) use tasks::map;
 pub(crate) use traverse::{Any, Closest, any, closest};
 pub(crate) use wide::Wide;
 
@@ -36,7 +42,7 @@ pub struct Bvh {
 }
 
 /// Objects in a leaf: one, since an object's own test costs far more than a box's.
-const OBJECTS_PER_LEAF: usize = 1;
+const OBJECTS_PER_LEAF: u32 = 1;
 
 impl Bvh {
     /// The tree over `boxes`; object i is `boxes[i]`. Empty boxes hold no object; one that is infinite or NaN is
@@ -48,9 +54,10 @@ impl Bvh {
     /// On 2³¹ boxes or more.
     #[must_use]
     pub fn build(boxes: &[Aabb]) -> Self {
-        let built = build(boxes.len(), &|i| boxes[i], OBJECTS_PER_LEAF);
-        let tree = Wide::collapse(&built);
-        Self { tree, objects: built.order(), starts: built.leaf_starts(), level: Level::detect() }
+        let sound = boxes.iter().filter(|b| b.is_finite() && !b.is_empty());
+        let whole = sound.fold(Aabb::EMPTY, |whole, &b| whole.union(b));
+        let built = build(boxes.len(), whole, &|i| boxes[i], OBJECTS_PER_LEAF);
+        Self { tree: built.tree, objects: built.objects, starts: built.starts, level: Level::detect() }
     }
 
     /// Calls `visit(object, bound)` for every object whose box the ray meets between `within.min` and the bound,

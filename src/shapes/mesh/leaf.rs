@@ -97,20 +97,16 @@ pub(super) fn build(positions: &[DVec3], triangles: &[[u32; 3]]) -> (Wide, Vec<L
         let p = positions[v as usize];
         b.union(Aabb { min: p, max: p })
     });
-    let binary = bvh::build(triangles.len(), &bounds, 8);
-    let tree = Wide::collapse(&binary);
-    let starts = binary.leaf_starts();
-    let leaves = starts
-        .windows(2)
-        .map(|range| {
-            let mut leaf = Leaf::EMPTY;
-            for (lane, item) in binary.items[range[0] as usize..range[1] as usize].iter().enumerate() {
-                leaf.set(lane, &tree.frame, &corners(item.index() as usize), item.index());
-            }
-            leaf
-        })
-        .collect();
-    (tree, leaves, whole)
+    let built = bvh::build(triangles.len(), whole, &bounds, 8);
+    let leaves = bvh::map(built.starts.len() - 1, |i| {
+        let mut leaf = Leaf::EMPTY;
+        let (from, to) = (built.starts[i] as usize, built.starts[i + 1] as usize);
+        for (lane, &number) in built.objects[from..to].iter().enumerate() {
+            leaf.set(lane, &built.tree.frame, &corners(number as usize), number);
+        }
+        leaf
+    });
+    (built.tree, leaves, whole)
 }
 
 /// The ray as the filter wants it: in f32, with the margins' constants.

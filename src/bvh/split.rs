@@ -1,0 +1,111 @@
+//! Where a set of boxes is split in two: surface area heuristic over bins (Wald 2007).
+
+use super::build::{Box8, Item};
+use fearless_simd::{Simd, f32x4, prelude::*};
+
+/// Below this depth items are halved by number, which ends within 32 more levels.
+pub(super) const DEEPEST_SAH: u32 = 64;
+
+const BINS: usize = 16;
+
+/// The first `mid` items are the one part, in the box `left`; the others the other.
+pub(super) struct Split {
+    pub(super) mid: usize,
+    pub(super) left: Box8,
+    pub(super) right: Box8,
+}
+
+fn halve<S: Simd>(simd: S, items: &[Item]) -> Split {
+    let mid = items.len() / 2;
+    let (a, b) = items.split_at(mid);
+    Split { mid, left: Box8::around(simd, a), right: Box8::around(simd, b) }
+}
+
+/// Which bin an item's centre falls into, on all three axes.
+struct Binning<S: Simd> {
+    simd: S,
+    least: f32x4<S>,
+    scale: f32x4<S>,
+}
+
+impl<S: Simd> Binning<S> {
+    /// Adding this rounds to an integer, which is then in the lowest bits.
+    const TO_INTEGER: f32 = 8_388_608.0; // 2²³
+
+    #[inline(always)]
+    fn bins(&self, item: &Item) -> [usize; 3] {
+        let at = ((item.middle(self.simd) - self.least) * self.scale).max(f32x4::splat(self.simd, 0.0));
+        let at: [f32; 4] = (at + f32x4::splat(self.simd, Self::TO_INTEGER)).into();
+        [0, 1, 2].map(|axis| at[axis].to_bits() as usize & (BINS - 1))
+    }
+}
+
+/// Reorders the items, two or more, into two parts. A leaf that holds up to `leaf` of them is tested as one.
+#[inline(always)]
+pub(super) fn split<S: Simd>(simd: S, items: &mut [Item], depth: u32, leaf: u32) -> Split {
+    let mut least = f32x4::splat(simd, f32::INFINITY);
+    let mut most = f32x4::splat(simd, f32::NEG_INFINITY);
+    for item in &*items {
+        let m = item.middle(simd);
+        least = least.min(m);
+        most = most.max(m);
+    }
+    let extent: [f32; 4] = (most - least).into();
+    // The largest centre falls into the last bin. Subnormal extents divide to infinity.
+    let scale = extent.map(|e| (BINS - 1) as f32 * (1.0 - 1e-6) / e).map(|s| if s.is_finite() { s } else { 0.0 });
+    if scale[..3] == [0.0; 3] || depth >= DEEPEST_SAH {
+        return halve(simd, items);
+    }
+    let binning = Binning { simd, least, scale: scale.simd_into(simd) };
+    let mut bounds = [[Box8::EMPTY; BINS]; 3];
+    let mut counts = [[0u32; BINS]; 3];
+    for item in &*items {
+        for (axis, bin) in binning.bins(item).into_iter().enumerate() {
+            counts[axis][bin] += 1;
+            bounds[axis][bin].grow(simd, &item.0);
+        }
+    }
+    let leaves = |count: u32| count.div_ceil(leaf) as f32;
+    let mut best = (f32::INFINITY, 0, 0);
+    for axis in 0..3 {
+        if scale[axis] == 0.0 {
+            continue;
+        }
+        let (bounds, counts) = (&bounds[axis], &counts[axis]);
+        let mut costs = [0.0f32; BINS];
+        let (mut b, mut count) = (Box8::EMPTY, 0);
+        for i in (1..BINS).rev() {
+            b.grow(simd, &bounds[i]);
+            count += counts[i];
+            costs[i] = b.half_area() * leaves(count);
+        }
+        let (mut b, mut count) = (Box8::EMPTY, 0);
+        for i in 1..BINS {
+            b.grow(simd, &bounds[i - 1]);
+            count += counts[i - 1];
+            let cost = b.half_area() * leaves(count) + costs[i];
+            // The first bin and the last are never empty. Infinite boxes cost infinitely much everywhere.
+            if cost < best.0 {
+                best = (cost, axis, i);
+            }
+        }
+    }
+    let (_, axis, boundary) = best;
+    if boundary == 0 {
+        return halve(simd, items);
+    }
+    let (mut left, mut right) = (Box8::EMPTY, Box8::EMPTY);
+    for (i, bin) in bounds[axis].iter().enumerate() {
+        (if i < boundary { &mut left } else { &mut right }).grow(simd, bin);
+    }
+    // Without branches: which way an item goes cannot be foreseen.
+    let mut mid = 0;
+    for i in 0..items.len() {
+        let item = items[i];
+        let goes_left = binning.bins(&item)[axis] < boundary;
+        items[i] = items[mid];
+        items[mid] = item;
+        mid += usize::from(goes_left);
+    }
+    Split { mid, left, right }
+}
