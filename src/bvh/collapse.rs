@@ -128,10 +128,7 @@ impl Plan {
             let inner_from = work.len();
             for (lane, &child) in children.iter().enumerate() {
                 let node = &binary.nodes[child as usize];
-                for axis in 0..3 {
-                    wide.rows[axis][lane] = node.min[axis];
-                    wide.rows[axis + 3][lane] = node.max[axis];
-                }
+                wide.set_box(lane, node.min, node.max);
                 let word = if self.choices[child as usize] & AS_LEAF != 0 {
                     let number = starts.len() as u32;
                     starts.push(objects.len() as u32);

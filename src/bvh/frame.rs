@@ -52,6 +52,12 @@ impl Frame {
         (x - self.center) * self.scale
     }
 
+    /// The way back: exact for what `local` and a rounding to f32 did not change.
+    #[inline(always)]
+    pub(crate) fn world(&self, x: DVec3) -> DVec3 {
+        x * self.unscale + self.center
+    }
+
     /// a − b in the frame: one rounding a coordinate, and underflow.
     #[inline(always)]
     pub(crate) fn local_difference(&self, a: DVec3, b: DVec3) -> DVec3 {

@@ -48,7 +48,7 @@ impl Traced<'_> {
                 if c == NONE {
                     continue;
                 }
-                let (min, max) = ([0, 1, 2].map(|a| node.rows[a][lane]), [3, 4, 5].map(|a| node.rows[a][lane]));
+                let (min, max) = ([0, 2, 4].map(|a| node.rows[a][lane]), [1, 3, 5].map(|a| node.rows[a][lane]));
                 let area = f64::from(half_area(&min, &max));
                 if c & LEAF != 0 {
                     leaves += area;
@@ -108,8 +108,8 @@ impl Traced<'_> {
                 }
                 let (mut near, mut far) = (0.0f64, limit);
                 for axis in 0..3 {
-                    let x = (f64::from(node.rows[axis][lane]) - o[axis]) / d[axis];
-                    let y = (f64::from(node.rows[axis + 3][lane]) - o[axis]) / d[axis];
+                    let x = (f64::from(node.rows[2 * axis][lane]) - o[axis]) / d[axis];
+                    let y = (f64::from(node.rows[2 * axis + 1][lane]) - o[axis]) / d[axis];
                     near = near.max(x.min(y));
                     far = far.min(x.max(y));
                 }

@@ -7,17 +7,16 @@
 use super::frame::Frame;
 use crate::kernel::float::power;
 use crate::{Interval, Ray};
-use fearless_simd::{Simd, f32x4, prelude::*};
+use fearless_simd::{Simd, f32x4, f64x2, prelude::*};
 use glam::DVec3;
 
-/// A ray in the frame of a tree, with what the box and leaf tests need of it.
-///
-/// `origin` + t·`direction` with 1 ≤ max |direction| < 2; t = λ·stretch − advance.
+/// A ray in the frame of a tree, with what the box and leaf tests need of it: `origin` + t·`direction`,
+/// t = λ·stretch − advance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalRay {
-    /// Which row of a node holds the plane met first, by axis, and from the fourth on the one met last.
-    pub(crate) planes: [u32; 8],
-    /// 1/direction, |inv| ≤ [`STEEPEST`].
+    /// Bit i: the direction's coordinate i is negative.
+    pub(crate) away: u32,
+    /// 1/direction, within ±`Placed::steepest`.
     pub(crate) inv: [f32; 4],
     pub(crate) near_shift: [f32; 4],
     pub(crate) far_shift: [f32; 4],
@@ -31,91 +30,89 @@ pub(crate) struct LocalRay {
     pub(crate) direction: [f32; 4],
     /// Largest coordinate of the origin.
     pub(crate) size: f32,
+    /// Largest coordinate of the direction.
+    pub(crate) length: f32,
     /// Each coordinate of the origin was off the ray by at most this before it was rounded.
     pub(crate) origin_error: f32,
     stretch: f64,
     advance: f64,
 }
 
-/// [`LocalRay::planes`] by the signs of the direction.
-const PLANES: [[u32; 8]; 8] = {
-    let mut table = [[0; 8]; 8];
-    let mut signs = 0;
-    while signs < 8 {
-        let mut axis = 0;
-        while axis < 3 {
-            let away = (signs >> axis & 1) as u32;
-            table[signs][axis] = axis as u32 + 3 * away;
-            table[signs][axis + 3] = axis as u32 + 3 - 3 * away;
-            axis += 1;
-        }
-        signs += 1;
-    }
-    table
-};
-
-/// Steeper slopes are taken for this one. A slab is then wider than the ray's stretch near the tree: §10.
-const STEEPEST: f32 = 1_099_511_627_776.0; // 2⁴⁰
-
 /// Margin of a box test, relative to 1 + |origin|: eight roundings of f32 (six are needed: §10).
 const SLAB: f32 = 8.0 / 16_777_216.0;
 
 /// Slack of a limit at or near zero. Nothing in a tree of width 1 is that small, and products with it stay clear of the
 /// subnormals, whose arithmetic costs a hundred times as much.
-const TINY: f64 = 1.0 / (1u64 << 63) as f64 / (1 << 17) as f64; // 2⁻⁸⁰
+const TINY: f64 = 1.0 / (1u64 << 60) as f64;
+
+/// Origins further out than this are first moved along the ray to the tree.
+const NEAR: f32 = 4.0;
+
+/// Directions in the frame whose largest coordinate is beyond these are first scaled.
+const LENGTHS: [f32; 2] = [1.0 / 1_099_511_627_776.0, 1_099_511_627_776.0]; // 2^±40
 
 /// Origins beyond this, before or after, are not traced.
 const FARTHEST: f64 = 1_125_899_906_842_624.0; // 2⁵⁰
 
-/// Origins further out than this are first moved along the ray to the tree.
-const NEAR: f64 = 4.0;
+/// Where a ray starts in the frame, in two vectors of (x, y) and (z, –).
+struct Placed<S: Simd> {
+    origin: [f64x2<S>; 2],
+    direction: [f64x2<S>; 2],
+    /// See [`LocalRay::origin_error`].
+    error: f32,
+    /// Slopes 1/direction beyond this are taken for it. A slab is then wider than the ray's stretch near the tree: §10.
+    steepest: f32,
+    stretch: f64,
+    advance: f64,
+}
 
 impl LocalRay {
     /// `None` where the ray cannot be expressed in the frame (then every leaf is visited): origins 2⁵⁰ times farther
     /// than the tree is wide, and directions as extreme; also for rays that are not valid and for empty intervals.
     #[inline(always)]
     pub(crate) fn new<S: Simd>(simd: S, frame: &Frame, ray: &Ray, within: Interval) -> Option<Self> {
-        let e = exponent_of_normal(largest(ray.direction));
-        let k = e - frame.exponent;
-        // A zero or subnormal direction has e = −1023, an infinite one e = 1024.
-        let in_range = (e.abs() <= 1000) & (k.abs() <= 1000);
-        let direction = ray.direction * power(if in_range { -e } else { 0 });
-        let start = frame.local(ray.origin);
-        let reach = largest(start);
-        let (mut origin, mut advance, mut size) = (start, 0.0, reach);
-        if reach > NEAR {
-            (origin, advance) = approach(start, direction);
-            size = largest(origin);
+        let pair = |x: f64, y: f64| f64x2::<S>::simd_from(simd, [x, y]);
+        let (o, d, c) = (ray.origin, ray.direction, frame.center);
+        let mut placed = Placed {
+            origin: [(pair(o.x, o.y) - pair(c.x, c.y)) * frame.scale, (pair(o.z, 0.0) - pair(c.z, 0.0)) * frame.scale],
+            direction: [pair(d.x, d.y) * frame.scale, pair(d.z, 0.0) * frame.scale],
+            // 2u of an origin below 4, and the underflow.
+            error: 8.0 * f64::EPSILON as f32,
+            steepest: LENGTHS[1] * LENGTHS[1],
+            stretch: 1.0,
+            advance: 0.0,
+        };
+        let (mut origin, mut direction) = placed.narrowed();
+        let mut length = direction.abs().reduce_max();
+        let near = origin.abs().simd_le(NEAR) & direction.abs().simd_le(LENGTHS[1]);
+        // A NaN fails every comparison.
+        if !((near.to_bitmask() == 0xf) & (length >= LENGTHS[0])) {
+            placed = place(simd, frame, ray)?;
+            (origin, direction) = placed.narrowed();
+            length = direction.abs().reduce_max();
         }
-        let sum = direction.element_sum() + origin.element_sum();
-        let sound = in_range & (reach <= FARTHEST) & (size <= FARTHEST) & sum.is_finite() & (within.min < within.max);
-        if !sound {
+        if !(within.min < within.max) {
             return None;
         }
-        // u·(|start| + |t·direction| + |origin|) ≤ u·(1 + 2 + 3)·reach, and the underflow of all; up by 2⁻¹⁰.
-        let origin_error = (4.004 * f64::EPSILON * reach + f64::from(f32::MIN_POSITIVE)) as f32;
-        let size = size as f32;
-        let pad = SLAB * (1.0 + size) + 2.0 * origin_error;
-        let (o, d) = (narrow(origin, 0.0), narrow(direction, 1.0));
-        let (o4, d4): (f32x4<S>, f32x4<S>) = (o.simd_into(simd), d.simd_into(simd));
         let one = f32x4::splat(simd, 1.0);
-        let gentle = d4.abs().simd_lt(1.0 / STEEPEST);
-        let inv = gentle.select(f32x4::splat(simd, STEEPEST), one / d4);
-        let (middle, half) = (o4 * inv, inv.abs() * pad);
-        let away = inv.simd_lt(0.0).to_bitmask() as usize;
+        let gentle = direction.abs().simd_lt(1.0 / placed.steepest);
+        let inv = gentle.select(f32x4::splat(simd, placed.steepest), one / direction);
+        let pad = origin.abs().mul_add(f32x4::splat(simd, SLAB), f32x4::splat(simd, SLAB + 2.0 * placed.error));
+        let (middle, half) = (origin * inv, inv.abs() * pad);
         let mut local = Self {
-            planes: PLANES[away & 7],
+            away: inv.simd_lt(0.0).to_bitmask() as u32,
             inv: inv.into(),
             near_shift: (middle + half).into(),
             far_shift: (middle - half).into(),
             t_min: 0.0,
             t_max: 0.0,
-            origin: o,
-            direction: d,
-            size,
-            origin_error,
-            stretch: power(k),
-            advance,
+            origin: origin.into(),
+            direction: direction.into(),
+            size: origin.abs().reduce_max(),
+            length,
+            origin_error: placed.error,
+            stretch: placed.stretch,
+            advance: placed.advance,
         };
         local.t_min = local.lower(within.min);
         local.t_max = local.upper(within.max);
@@ -148,6 +145,46 @@ impl LocalRay {
     }
 }
 
+impl<S: Simd> Placed<S> {
+    #[inline(always)]
+    fn narrowed(&self) -> (f32x4<S>, f32x4<S>) {
+        (self.origin[0].relaxed_narrow(self.origin[1]), self.direction[0].relaxed_narrow(self.direction[1]))
+    }
+}
+
+/// Rays from far outside, and with very long or short directions.
+#[inline(never)]
+fn place<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<Placed<S>> {
+    let e = exponent_of_normal(largest(ray.direction));
+    let k = e - frame.exponent;
+    // A zero or subnormal direction has e = −1023, an infinite one e = 1024.
+    if (e.abs() > 1000) | (k.abs() > 1000) {
+        return None;
+    }
+    let direction = ray.direction * power(-e);
+    let start = frame.local(ray.origin);
+    let reach = largest(start);
+    let (mut origin, mut advance, mut size) = (start, 0.0, reach);
+    if reach > f64::from(NEAR) {
+        (origin, advance) = approach(start, direction);
+        size = largest(origin);
+    }
+    let sum = direction.element_sum() + origin.element_sum();
+    if !((reach <= FARTHEST) & (size <= FARTHEST) & sum.is_finite()) {
+        return None;
+    }
+    let pair = |x: f64, y: f64| f64x2::<S>::simd_from(simd, [x, y]);
+    Some(Placed {
+        origin: [pair(origin.x, origin.y), pair(origin.z, 0.0)],
+        direction: [pair(direction.x, direction.y), pair(direction.z, 0.0)],
+        // u·(|start| + |t·direction| + |origin|) ≤ u·(1 + 2 + 3)·reach, and the underflow of all; up by 2⁻¹⁰.
+        error: (4.004 * f64::EPSILON * reach + f64::from(f32::MIN_POSITIVE)) as f32,
+        steepest: LENGTHS[1],
+        stretch: power(k),
+        advance,
+    })
+}
+
 /// The ray moved to where its steepest coordinate is zero, and by how much: the whole tree lies within ±1 of there.
 #[inline(never)]
 fn approach(start: DVec3, direction: DVec3) -> (DVec3, f64) {
@@ -174,9 +211,4 @@ fn largest(v: DVec3) -> f64 {
 #[inline(always)]
 fn exponent_of_normal(x: f64) -> i32 {
     ((x.to_bits() >> 52) & 0x7ff) as i32 - 1023
-}
-
-#[inline(always)]
-fn narrow(v: DVec3, last: f32) -> [f32; 4] {
-    [v.x as f32, v.y as f32, v.z as f32, last]
 }

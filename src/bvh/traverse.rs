@@ -94,6 +94,8 @@ struct Lanes<S: Simd> {
     near_shift: [f32x8<S>; 3],
     far_shift: [f32x8<S>; 3],
     t_min: f32x8<S>,
+    /// Which row of a node holds the plane met first, by axis; the other of the pair is met last.
+    near: [u32; 3],
 }
 
 impl<S: Simd> Lanes<S> {
@@ -104,16 +106,17 @@ impl<S: Simd> Lanes<S> {
             near_shift: spread(simd, &ray.near_shift),
             far_shift: spread(simd, &ray.far_shift),
             t_min: f32x8::splat(simd, ray.t_min),
+            near: [ray.away & 1, 2 + (ray.away >> 1 & 1), 4 + (ray.away >> 2 & 1)],
         }
     }
 
     /// Which of the node's boxes the ray may meet before `t_max`, and from which t on.
     #[inline(always)]
-    fn test(&self, simd: S, node: &WideNode, ray: &LocalRay, t_max: f32) -> (u32, f32x8<S>) {
+    fn test(&self, simd: S, node: &WideNode, t_max: f32) -> (u32, f32x8<S>) {
         let [inv, near, far] = [&self.inv, &self.near_shift, &self.far_shift];
-        let (near_x, far_x) = (row(simd, node, ray.planes[0]), row(simd, node, ray.planes[3]));
-        let (near_y, far_y) = (row(simd, node, ray.planes[1]), row(simd, node, ray.planes[4]));
-        let (near_z, far_z) = (row(simd, node, ray.planes[2]), row(simd, node, ray.planes[5]));
+        let (near_x, far_x) = (row(simd, node, self.near[0]), row(simd, node, self.near[0] ^ 1));
+        let (near_y, far_y) = (row(simd, node, self.near[1]), row(simd, node, self.near[1] ^ 1));
+        let (near_z, far_z) = (row(simd, node, self.near[2]), row(simd, node, self.near[2] ^ 1));
         let enter_x = near_x.mul_sub(inv[0], near[0]);
         let enter_y = near_y.mul_sub(inv[1], near[1]);
         let enter_z = near_z.mul_sub(inv[2], near[2]);
@@ -152,7 +155,7 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mu
         // Down to a leaf, or to nothing.
         while at & LEAF == 0 {
             let node = &nodes[at as usize];
-            let (mut hits, enter) = lanes.test(simd, node, ray, t_max);
+            let (mut hits, enter) = lanes.test(simd, node, t_max);
             if hits == 0 {
                 at = NONE;
                 break;
@@ -209,7 +212,7 @@ pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut im
     loop {
         if at & LEAF == 0 {
             let node = &nodes[at as usize];
-            let (mut hits, _) = lanes.test(simd, node, ray, ray.t_max);
+            let (mut hits, _) = lanes.test(simd, node, ray.t_max);
             stack.reserve();
             while hits != 0 {
                 let i = 31 - hits.leading_zeros() as usize;

@@ -4,8 +4,8 @@ use super::frame::Frame;
 
 /// Eight children, 256 bytes, four cache lines.
 ///
-/// Rows 0–2 are the least x, y, z of every child, 3–5 the greatest, [`CHILDREN`] what the child is, as the bits of a
-/// float. One array of a power of two of rows, so that a row number needs no check.
+/// Rows 0, 2, 4 are the least x, y, z of every child, 1, 3, 5 the greatest, [`CHILDREN`] what the child is, as the bits
+/// of a float. One array of a power of two of rows, so that a row number needs no check.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct WideNode {
@@ -22,12 +22,19 @@ impl WideNode {
     /// No children.
     pub(crate) const EMPTY: Self = {
         let (out, back) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
-        Self { rows: [out, out, out, back, back, back, [f32::from_bits(NONE); 8], [0.0; 8]] }
+        Self { rows: [out, back, out, back, out, back, [f32::from_bits(NONE); 8], [0.0; 8]] }
     };
 
     #[inline(always)]
     pub(crate) fn child(&self, lane: usize) -> u32 {
         self.rows[CHILDREN][lane & 7].to_bits()
+    }
+
+    pub(crate) fn set_box(&mut self, lane: usize, min: [f32; 3], max: [f32; 3]) {
+        for axis in 0..3 {
+            self.rows[2 * axis][lane] = min[axis];
+            self.rows[2 * axis + 1][lane] = max[axis];
+        }
     }
 
     pub(crate) fn set_child(&mut self, lane: usize, child: u32) {

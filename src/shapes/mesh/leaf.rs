@@ -13,8 +13,6 @@ use glam::DVec3;
 /// Triangles have 29 bits for their number.
 pub(super) const MOST_TRIANGLES: usize = 1 << 29;
 const NUMBER: u32 = (1 << 29) - 1;
-/// Vertices in f32 and the frame are the mesh's own, exactly.
-const EXACT: u32 = 1 << 31;
 const ROTATION: u32 = 29;
 
 /// Up to eight triangles, with v₀ opposite the longest edge.
@@ -22,19 +20,20 @@ const ROTATION: u32 = 29;
 #[repr(C, align(32))]
 pub(super) struct Leaf {
     v0: [[f32; 8]; 3],
-    e1: [[f32; 8]; 3],
-    e2: [[f32; 8]; 3],
+    /// v₁ and v₂ where they are the mesh's own, exactly; else e₁ = v₁ − v₀ and e₂ = v₂ − v₀, which lose less.
+    v1: [[f32; 8]; 3],
+    v2: [[f32; 8]; 3],
     /// Not below |e₁| + |e₂|; −1 in a lane that holds no triangle.
     size: [f32; 8],
-    /// The triangle's number, by how many places its vertices are rotated, and [`EXACT`].
+    /// The triangle's number, and by how many places its vertices are rotated.
     id: [u32; 8],
 }
 
 impl Leaf {
-    const EMPTY: Self = Self { v0: [[0.0; 8]; 3], e1: [[0.0; 8]; 3], e2: [[0.0; 8]; 3], size: [-1.0; 8], id: [0; 8] };
+    const EMPTY: Self = Self { v0: [[0.0; 8]; 3], v1: [[0.0; 8]; 3], v2: [[0.0; 8]; 3], size: [-1.0; 8], id: [0; 8] };
 
     /// Puts triangle `number` into a lane.
-    fn set(&mut self, lane: usize, frame: &Frame, vertices: &[DVec3; 3], number: u32) {
+    fn set(&mut self, lane: usize, frame: &Frame, exact: bool, vertices: &[DVec3; 3], number: u32) {
         let lengths = [0, 1, 2].map(|i| {
             let e = frame.local_difference(vertices[(i + 2) % 3], vertices[(i + 1) % 3]);
             e.length_squared()
@@ -42,17 +41,15 @@ impl Leaf {
         let rotation = (0..3).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
         let [a, b, c] = [0, 1, 2].map(|i| vertices[(i + rotation) % 3]);
         let (v0, e1, e2) = (frame.local(a), frame.local_difference(b, a), frame.local_difference(c, a));
+        let (v1, v2) = if exact { (frame.local(b), frame.local(c)) } else { (e1, e2) };
         for i in 0..3 {
             self.v0[i][lane] = v0[i] as f32;
-            self.e1[i][lane] = e1[i] as f32;
-            self.e2[i][lane] = e2[i] as f32;
+            self.v1[i][lane] = v1[i] as f32;
+            self.v2[i][lane] = v2[i] as f32;
         }
         // Two square roots and a sum in f64, then up: 2⁻²⁰ is far more than they lose.
         self.size[lane] = ((e1.length() + e2.length()) * (1.0 + 1e-6)) as f32;
-        self.id[lane] = number | (rotation as u32) << ROTATION | EXACT;
-        if self.rebuilt(lane, frame) != *vertices {
-            self.id[lane] &= !EXACT;
-        }
+        self.id[lane] = number | (rotation as u32) << ROTATION;
     }
 
     #[inline(always)]
@@ -60,30 +57,23 @@ impl Leaf {
         self.id[lane] & NUMBER
     }
 
-    /// The vertices from the f32 copy, in the mesh's order.
+    /// The vertices, without a look at the mesh's own arrays where the copy is exact.
     #[inline(always)]
-    fn rebuilt(&self, lane: usize, frame: &Frame) -> [DVec3; 3] {
-        let v0 = column(&self.v0, lane);
-        let (v1, v2) = (v0 + column(&self.e1, lane), v0 + column(&self.e2, lane));
-        let a = v0 * frame.unscale + frame.center;
-        let b = v1 * frame.unscale + frame.center;
-        let c = v2 * frame.unscale + frame.center;
-        match self.id[lane] >> ROTATION & 3 {
+    pub(super) fn vertices(&self, lane: usize, mesh: &Mesh) -> [DVec3; 3] {
+        if !mesh.exact {
+            return mesh.vertices(self.number(lane));
+        }
+        let [a, b, c] = [&self.v0, &self.v1, &self.v2].map(|rows| mesh.frame().world(column(rows, lane)));
+        match self.id[lane] >> ROTATION {
             0 => [a, b, c],
             1 => [c, a, b],
             _ => [b, c, a],
         }
     }
-
-    /// The vertices, without a look at the mesh's own arrays where the copy is exact.
-    #[inline(always)]
-    pub(super) fn vertices(&self, lane: usize, mesh: &Mesh) -> [DVec3; 3] {
-        if self.id[lane] & EXACT != 0 { self.rebuilt(lane, mesh.frame()) } else { mesh.vertices(self.number(lane)) }
-    }
 }
 
-/// The tree over the triangles, its leaves, and the box around all.
-pub(super) fn build(positions: &[DVec3], triangles: &[[u32; 3]]) -> (Wide, Vec<Leaf>, Aabb) {
+/// The tree over the triangles, its leaves, whether these hold the vertices exactly, and the box around all.
+pub(super) fn build(positions: &[DVec3], triangles: &[[u32; 3]]) -> (Wide, Vec<Leaf>, bool, Aabb) {
     let corners = |i: usize| triangles[i].map(|v| positions[v as usize]);
     let bounds = |i: usize| {
         let t = &triangles[i];
@@ -98,15 +88,17 @@ pub(super) fn build(positions: &[DVec3], triangles: &[[u32; 3]]) -> (Wide, Vec<L
         b.union(Aabb { min: p, max: p })
     });
     let built = bvh::build(triangles.len(), whole, &bounds, 8);
+    let frame = &built.tree.frame;
+    let exact = positions.iter().all(|&p| frame.world(frame.local(p).as_vec3().as_dvec3()) == p);
     let leaves = bvh::map(built.starts.len() - 1, |i| {
         let mut leaf = Leaf::EMPTY;
         let (from, to) = (built.starts[i] as usize, built.starts[i + 1] as usize);
         for (lane, &number) in built.objects[from..to].iter().enumerate() {
-            leaf.set(lane, &built.tree.frame, &corners(number as usize), number);
+            leaf.set(lane, frame, exact, &corners(number as usize), number);
         }
         leaf
     });
-    (built.tree, leaves, whole)
+    (built.tree, leaves, exact, whole)
 }
 
 /// The ray as the filter wants it: in f32, with the margins' constants.
@@ -122,6 +114,8 @@ pub(super) struct Probe {
     pub(super) t_min: f32,
     /// No hit has a t above this in absolute value.
     reach: f32,
+    /// Leaves hold vertices, not edges.
+    exact: bool,
 }
 
 /// The unit roundoff of f32, 2⁻²⁴.
@@ -132,19 +126,19 @@ const UNDERFLOW: f32 = 1e-36;
 
 impl Probe {
     #[inline(always)]
-    pub(super) fn new(ray: &LocalRay) -> Self {
-        // |direction| < 2√3 and |v₀ − o| ≤ √3(1 + size), with the origin's own error as if it were part of that.
-        let d = 3.4642;
-        let reach = (1.0 + ray.size) * (1.0 + 1e-5) + ray.origin_error * (1.0 / E);
-        let r = 1.7321 * reach;
+    pub(super) fn new(ray: &LocalRay, exact: bool) -> Self {
+        // |direction| ≤ √3·length and |v₀ − o| ≤ √3(1 + size), with the origin's own error as if it were part of that.
+        let steps = (1.0 + ray.size) * (1.0 + 1e-5) + ray.origin_error * (1.0 / E);
+        let (d, r, reach) = (1.7321 * ray.length, 1.7321 * steps, steps / ray.length);
         Self {
             origin: ray.origin,
             direction: ray.direction,
             edge: 13.0 * E * d * r,
             edge2: 3.1 * E * d,
-            depth: 3.1 * E * (r + reach * d),
+            depth: 6.2 * E * r,
             t_min: if ray.t_min > -reach { ray.t_min } else { -reach },
             reach,
+            exact,
         }
     }
 
@@ -154,14 +148,15 @@ impl Probe {
         if t_max < self.reach { t_max } else { self.reach }
     }
 
-    /// Which triangles of `leaf` may be met between `t_min` and `t_max`, and what is known of them.
+    /// Which triangles of `leaf` may be met between `t_min` and `t_max`, and what is known of them; `None` if none.
     #[inline(always)]
-    pub(super) fn test<S: Simd>(&self, simd: S, leaf: &Leaf, t_max: f32) -> Outcome<S> {
-        let (v0, e1, e2) = (load(simd, &leaf.v0), load(simd, &leaf.e1), load(simd, &leaf.e2));
+    pub(super) fn test<S: Simd>(&self, simd: S, leaf: &Leaf, t_max: f32) -> Option<Outcome> {
+        let (v0, v1, v2) = (load(simd, &leaf.v0), load(simd, &leaf.v1), load(simd, &leaf.v2));
         let (o, d) = (spread(simd, &self.origin), spread(simd, &self.direction));
         let size: f32x8<S> = leaf.size.simd_into(simd);
 
-        let c = [v0[0] - o[0], v0[1] - o[1], v0[2] - o[2]];
+        let (e1, e2) = if self.exact { (minus(v1, v0), minus(v2, v0)) } else { (v1, v2) };
+        let c = minus(v0, o);
         let r = cross(c, d);
         let n = cross(e1, e2);
         let det = dot(n, d);
@@ -173,49 +168,39 @@ impl Probe {
         // Certainly a miss: one edge function above zero, another below. An empty lane has a negative margin.
         let least = u.min(v.min(w));
         let most = u.max(v.max(w));
-        let outside = least.simd_lt(-margin) & most.simd_gt(margin);
+        let outside = (least.simd_lt(-margin) & most.simd_gt(margin)).to_bitmask() as u32;
+        if outside == 0xff {
+            return None;
+        }
         // Certainly through: all three above zero, or all below.
         let through = least.simd_gt(margin) | most.simd_lt(-margin);
 
         // The sign of det goes to t's numerator; where it is uncertain the margin is wide enough for both.
         let t = dot(n, c);
         let depth = (size * size).mul_add(splat(simd, self.depth), splat(simd, UNDERFLOW));
-        let size_of_det = det.max(-det);
+        let size_of_det = det.abs();
         let signed = t * splat(simd, 1.0).copysign(det);
         let beyond = (signed - size_of_det * splat(simd, self.last(t_max))).simd_gt(depth);
         let before = (signed - size_of_det * splat(simd, self.t_min)).simd_lt(-depth);
-        Outcome {
-            maybe: !((outside | beyond | before).to_bitmask() as u32) & 0xff,
-            through: through.to_bitmask() as u32,
-            numerator: signed,
-            denominator: size_of_det,
-            margin: depth,
+        let maybe = !(outside | (beyond | before).to_bitmask() as u32) & 0xff;
+        if maybe == 0 {
+            return None;
         }
+        let depths = Depths { numerator: signed.into(), denominator: size_of_det.into(), margin: depth.into() };
+        Some(Outcome { maybe, through: through.to_bitmask() as u32, depths })
     }
 }
 
-/// What the filter says of a leaf.
-pub(super) struct Outcome<S: Simd> {
+/// What the filter says of a leaf that it cannot drop.
+pub(super) struct Outcome {
     /// The lanes that are not certain to miss.
     pub(super) maybe: u32,
     /// The lanes whose triangles' insides the ray's line passes through, for certain.
     pub(super) through: u32,
-    /// |numerator − t·denominator| ≤ margin at the exact t.
-    pub(super) numerator: f32x8<S>,
-    pub(super) denominator: f32x8<S>,
-    pub(super) margin: f32x8<S>,
+    pub(super) depths: Depths,
 }
 
-impl<S: Simd> Outcome<S> {
-    /// As numbers.
-    #[inline(always)]
-    pub(super) fn depths(&self) -> Depths {
-        Depths { numerator: self.numerator.into(), denominator: self.denominator.into(), margin: self.margin.into() }
-    }
-}
-
-/// t of a leaf's triangles, by lane.
-#[derive(Debug)]
+/// t of a leaf's triangles, by lane: |numerator − t·denominator| ≤ margin at the exact t.
 pub(super) struct Depths {
     numerator: [f32; 8],
     denominator: [f32; 8],
@@ -248,6 +233,11 @@ fn spread<S: Simd>(simd: S, v: &[f32; 4]) -> Vec8<S> {
 #[inline(always)]
 fn load<S: Simd>(simd: S, rows: &[[f32; 8]; 3]) -> Vec8<S> {
     [rows[0].simd_into(simd), rows[1].simd_into(simd), rows[2].simd_into(simd)]
+}
+
+#[inline(always)]
+fn minus<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]

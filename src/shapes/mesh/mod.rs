@@ -37,6 +37,8 @@ pub struct Mesh {
     bounds: Aabb,
     tree: Wide,
     leaves: Vec<Leaf>,
+    /// The leaves hold the vertices themselves, not rounded ones.
+    exact: bool,
     level: Level,
 }
 
@@ -58,9 +60,9 @@ impl Mesh {
                 return Err(InvalidShape::IndexOutOfRange { field: "triangles", at, index, count });
             }
         }
-        let (tree, leaves, bounds) = leaf::build(&positions, &triangles);
+        let (tree, leaves, exact, bounds) = leaf::build(&positions, &triangles);
         let level = Level::detect();
-        Ok(Self { positions, triangles, normals: Vec::new(), uvs: Vec::new(), bounds, tree, leaves, level })
+        Ok(Self { positions, triangles, normals: Vec::new(), uvs: Vec::new(), bounds, tree, leaves, exact, level })
     }
 
     /// With a shading normal for each position, of any length; they are interpolated over the triangles, and where

@@ -1,7 +1,7 @@
 //! Closest and any hit of a mesh.
 
 use super::Mesh;
-use super::leaf::{Depths, Leaf, Probe};
+use super::leaf::{Leaf, Outcome, Probe};
 use crate::bvh::{self, LocalRay};
 use crate::kernel::eft::{Fused, Split};
 use crate::kernel::triangle;
@@ -23,7 +23,7 @@ fn closest_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> O
         ray,
         within,
         local: &local,
-        probe: Probe::new(&local),
+        probe: Probe::new(&local, mesh.exact),
         t_max: local.t_max,
         passed: [Passed { leaf: 0, lane: 0, t: 0.0 }; MOST_PASSED],
         count: 0,
@@ -46,7 +46,7 @@ fn any_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> bool 
     let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else {
         return closest_of_all(mesh, ray, within).is_some();
     };
-    let mut first = First { mesh, ray, within, local: &local, probe: Probe::new(&local) };
+    let mut first = First { mesh, ray, within, local: &local, probe: Probe::new(&local, mesh.exact) };
     bvh::any(simd, &mesh.tree, &local, &mut first)
 }
 
@@ -143,7 +143,20 @@ struct Nearest<'a> {
 impl Nearest<'_> {
     /// Out of line, so that the walk keeps its registers.
     #[inline(never)]
-    fn candidates<S: Simd>(&mut self, simd: S, leaf: u32, mut lanes: u32, through: u32, depths: &Depths) {
+    fn visit<S: Simd>(&mut self, simd: S, leaf: u32) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                if let Some(outcome) = self.probe.test(simd, &self.mesh.leaves[leaf as usize], self.t_max) {
+                    self.candidates(simd, leaf, &outcome);
+                }
+            },
+        );
+    }
+
+    #[inline(never)]
+    fn candidates<S: Simd>(&mut self, simd: S, leaf: u32, outcome: &Outcome) {
+        let &Outcome { maybe: mut lanes, through, ref depths } = outcome;
         let sure = Sure::new(self.local, self.within);
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
@@ -203,10 +216,7 @@ impl Nearest<'_> {
 impl bvh::Closest for Nearest<'_> {
     #[inline(always)]
     fn leaf<S: Simd>(&mut self, simd: S, leaf: u32) -> f32 {
-        let outcome = self.probe.test(simd, &self.mesh.leaves[leaf as usize], self.t_max);
-        if outcome.maybe != 0 {
-            self.candidates(simd, leaf, outcome.maybe, outcome.through, &outcome.depths());
-        }
+        self.visit(simd, leaf);
         self.t_max
     }
 }
@@ -223,15 +233,25 @@ struct First<'a> {
 impl bvh::Any for First<'_> {
     #[inline(always)]
     fn leaf<S: Simd>(&mut self, simd: S, leaf: u32) -> bool {
-        let leaf = &self.mesh.leaves[leaf as usize];
-        let outcome = self.probe.test(simd, leaf, self.local.t_max);
-        outcome.maybe != 0 && self.candidates(simd, leaf, outcome.maybe, outcome.through, &outcome.depths())
+        self.visit(simd, &self.mesh.leaves[leaf as usize])
     }
 }
 
 impl First<'_> {
     #[inline(never)]
-    fn candidates<S: Simd>(&self, simd: S, leaf: &Leaf, lanes: u32, through: u32, depths: &Depths) -> bool {
+    fn visit<S: Simd>(&self, simd: S, leaf: &Leaf) -> bool {
+        simd.vectorize(
+            #[inline(always)]
+            || match self.probe.test(simd, leaf, self.local.t_max) {
+                Some(outcome) => self.candidates(simd, leaf, &outcome),
+                None => false,
+            },
+        )
+    }
+
+    #[inline(never)]
+    fn candidates<S: Simd>(&self, simd: S, leaf: &Leaf, outcome: &Outcome) -> bool {
+        let &Outcome { maybe: lanes, through, ref depths } = outcome;
         let sure = Sure::new(self.local, self.within);
         let each = |lanes: u32| (0..8).filter(move |lane| lanes >> lane & 1 == 1);
         each(lanes & through).any(|lane| sure.holds(depths.interval(lane)))
