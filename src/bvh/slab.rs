@@ -1,6 +1,6 @@
 //! One ray against eight boxes in f32, never missing what the f64 ray meets.
 //!
-//! t = plane·inv − shift, one fused multiply-add a plane, with both shifts widened by what the roundings of plane,
+//! t = plane·inv + shift, one fused multiply-add a plane, with both shifts widened by what the roundings of plane,
 //! origin, inverse and result may add up to: docs/numerics.md §10 has the proof. The form is Embree's; its margins, a
 //! fixed number of ulps of t, do not cover the rounding of the origin and are replaced.
 
@@ -102,8 +102,8 @@ impl LocalRay {
         let mut local = Self {
             away: inv.simd_lt(0.0).to_bitmask() as u32,
             inv: inv.into(),
-            near_shift: (middle + half).into(),
-            far_shift: (middle - half).into(),
+            near_shift: (-middle - half).into(),
+            far_shift: (half - middle).into(),
             t_min: 0.0,
             t_max: 0.0,
             origin: origin.into(),

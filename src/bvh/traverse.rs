@@ -117,12 +117,12 @@ impl<S: Simd> Lanes<S> {
         let (near_x, far_x) = (row(simd, node, self.near[0]), row(simd, node, self.near[0] ^ 1));
         let (near_y, far_y) = (row(simd, node, self.near[1]), row(simd, node, self.near[1] ^ 1));
         let (near_z, far_z) = (row(simd, node, self.near[2]), row(simd, node, self.near[2] ^ 1));
-        let enter_x = near_x.mul_sub(inv[0], near[0]);
-        let enter_y = near_y.mul_sub(inv[1], near[1]);
-        let enter_z = near_z.mul_sub(inv[2], near[2]);
-        let exit_x = far_x.mul_sub(inv[0], far[0]);
-        let exit_y = far_y.mul_sub(inv[1], far[1]);
-        let exit_z = far_z.mul_sub(inv[2], far[2]);
+        let enter_x = near_x.mul_add(inv[0], near[0]);
+        let enter_y = near_y.mul_add(inv[1], near[1]);
+        let enter_z = near_z.mul_add(inv[2], near[2]);
+        let exit_x = far_x.mul_add(inv[0], far[0]);
+        let exit_y = far_y.mul_add(inv[1], far[1]);
+        let exit_z = far_z.mul_add(inv[2], far[2]);
         let enter = enter_x.max(enter_y).max(enter_z.max(self.t_min));
         let exit = exit_x.min(exit_y).min(exit_z.min(f32x8::splat(simd, t_max)));
         // Certainly a miss only if it enters after it has left.
@@ -210,16 +210,25 @@ pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut im
     let mut stack = Stack::new();
     let mut at = 0u32;
     loop {
-        if at & LEAF == 0 {
+        while at & LEAF == 0 {
             let node = &nodes[at as usize];
             let (mut hits, _) = lanes.test(simd, node, ray.t_max);
-            stack.reserve();
-            while hits != 0 {
-                let i = 31 - hits.leading_zeros() as usize;
-                hits &= !(1 << i);
-                stack.push(u64::from(node.child(i)));
+            if hits == 0 {
+                at = NONE;
+                break;
             }
-        } else if at != NONE && leaves.leaf(simd, at & !LEAF) {
+            at = node.child(hits.trailing_zeros() as usize);
+            hits &= hits - 1;
+            if hits != 0 {
+                stack.reserve();
+            }
+            while hits != 0 {
+                let i = 31 - hits.leading_zeros();
+                hits &= !(1 << i);
+                stack.push(u64::from(node.child(i as usize)));
+            }
+        }
+        if at != NONE && leaves.leaf(simd, at & !LEAF) {
             return true;
         }
         let Some((child, _)) = stack.pop() else { return false };
