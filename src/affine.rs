@@ -1,24 +1,26 @@
 //! A shape seen through an affine map.
 
 use crate::kernel::bound::{INFLATE, U};
-use crate::kernel::cpu;
-use crate::kernel::dyadic::Dyadic;
-use crate::kernel::eft::{Fused, Product, Split, two_sum};
-use crate::kernel::float::{exponent_of, ldexp, unit};
-use crate::kernel::number::{Number, Vector, cross, dot, vector};
-use crate::kernel::ratio::Ratio;
+use crate::kernel::eft::{Split, two_diff, two_sum};
+use crate::kernel::float::{exponent_of, ldexp, power, unit};
+use crate::kernel::map::{Image, Map, Unusable, inverse, sum, taxicab};
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 /// `shape` moved, turned, scaled, mirrored or sheared by an affine map.
 ///
 /// Rays are taken to the shape rather than the shape to the rays, so any shape goes under any map, maps nest, and one
-/// `Arc<Mesh>` under many maps is instancing. λ is the same in both frames: directions are never normalised.
+/// `Arc<Mesh>` under many maps is instancing. λ is the same in both frames: directions are never normalised. A chain of
+/// maps is multiplied when it is made and costs what one map does.
 ///
 /// The shape is *defined* by [`object_from_world`](Self::object_from_world), the inverse map rounded to floats: a point x
-/// belongs to it if `object_from_world` · x belongs to the inner shape. A ray's image is rounded once, and hit or miss is
-/// decided exactly for that image; λ is then corrected for the rounding, and the hit's `error` covers what is left.
-/// Normals are Mᵀn normalised, M = `object_from_world`: outward stays outward under mirrors too.
+/// belongs to it if `object_from_world` · x belongs to the inner shape. Normals are Mᵀn normalised,
+/// M = `object_from_world`: outward stays outward under mirrors too.
+///
+/// **What is decided.** A ray's exact image need not have float components. Hit or miss is decided, exactly, for
+/// [`object_ray`](Self::object_ray): that image with each component rounded once. Where the ray meets the surface within
+/// a unit in the last place of an edge or of a tangent, the exact image may decide otherwise, and nowhere else. λ is
+/// corrected for the rounding, `error` bounds what is left of it, and it is this λ that is compared with the interval.
 ///
 /// ```
 /// use truehit::glam::{DAffine3, DVec3};
@@ -34,8 +36,11 @@ pub struct Affine<S> {
     shape: S,
     object_from_world: DAffine3,
     world_from_object: DAffine3,
+    /// To the frame of the innermost shape, which is `shape` unless that is itself seen through a map.
+    innermost_from_world: Map,
+    world_from_innermost: DAffine3,
     bounds: Aabb,
-    /// At least ‖M‖, M = `object_from_world`, and ‖M⁻¹‖: by how much they may lengthen a vector.
+    /// At least ‖M‖, M = `innermost_from_world`, and ‖M⁻¹‖: by how much they may lengthen a vector.
     norms: [f64; 2],
 }
 
@@ -45,17 +50,42 @@ impl<S: Shape> Affine<S> {
     /// # Errors
     /// [`InvalidShape::NotFinite`] for a NaN or an infinity; [`InvalidShape::Singular`] if the map flattens space: its
     /// exact determinant is zero, or that of its rounded inverse; [`InvalidShape::OutOfRange`] if the inverse leaves the
-    /// range of floats.
+    /// range of floats, or a chain's product does.
     pub fn new(shape: S, world_from_object: DAffine3) -> Result<Self, InvalidShape> {
         if !world_from_object.is_finite() {
             return Err(InvalidShape::NotFinite { field: FIELD });
         }
-        let object_from_world = inverse(&world_from_object)?;
+        let object_from_world = inverse(&world_from_object).map_err(refused)?;
         // What the shape is defined by, inverted: not quite the map that was given.
-        let world_from_object = inverse(&object_from_world)?;
-        let bounds = shape.bounds_under(&world_from_object);
-        let norms = [largest_stretch(&object_from_world.matrix3), largest_stretch(&world_from_object.matrix3)];
-        Ok(Self { shape, object_from_world, world_from_object, bounds, norms })
+        let world_from_object = inverse(&object_from_world).map_err(refused)?;
+        let (innermost_from_world, world_from_innermost, bounds) = match shape.seen_through() {
+            Some((innermost, map)) => {
+                let map = map.after(&object_from_world).map_err(refused)?;
+                let inverse = map.inverse().map_err(refused)?;
+                (map, inverse, innermost.bounds_under(&inverse))
+            }
+            None => (object_from_world.into(), world_from_object, shape.bounds_under(&world_from_object)),
+        };
+        let norms = [innermost_from_world.leading(), &world_from_innermost].map(|m| largest_stretch(&m.matrix3));
+        Ok(Self {
+            shape,
+            object_from_world,
+            world_from_object,
+            innermost_from_world,
+            world_from_innermost,
+            bounds,
+            norms,
+        })
+    }
+
+    /// The ray that hit or miss is decided for, in the frame of the innermost shape: that of [`shape`](Self::shape), or
+    /// if that is itself an `Affine`, of the shape inside it, and so on.
+    ///
+    /// Each component x is off the exact image's by at most u·|x| + 48u²·P with u = 2⁻⁵³ and P the sum of absolute values
+    /// of the products that x is made of: half a unit in the last place, unless the maps all but cancel it.
+    #[must_use]
+    pub fn object_ray(&self, world_ray: &Ray) -> Ray {
+        self.image(world_ray).ray
     }
 }
 
@@ -77,38 +107,15 @@ impl<S> Affine<S> {
     pub fn world_from_object(&self) -> &DAffine3 {
         &self.world_from_object
     }
-
-    /// Mᵀn, a unit vector.
-    fn world_normal(&self, object_normal: DVec3) -> DVec3 {
-        let n = self.object_from_world.matrix3.transpose() * object_normal;
-        unit(n).unwrap_or(object_normal)
-    }
 }
 
 const FIELD: &str = "world_from_object";
 
-/// The inverse, found exactly and rounded once: no determinant under- or overflows.
-fn inverse(map: &DAffine3) -> Result<DAffine3, InvalidShape> {
-    let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis].map(vector::<Dyadic>);
-    let rows = [cross(&y, &z), cross(&z, &x), cross(&x, &y)];
-    let det = dot(&x, &rows[0]);
-    if det.is_zero() {
-        return Err(InvalidShape::Singular { field: FIELD });
+fn refused(why: Unusable) -> InvalidShape {
+    match why {
+        Unusable::Singular => InvalidShape::Singular { field: FIELD },
+        Unusable::OutOfRange => InvalidShape::OutOfRange { field: FIELD, value: f64::INFINITY },
     }
-    let over = |numerator: &Dyadic| {
-        let ratio = Ratio { numerator: numerator.clone(), denominator: det.clone() };
-        match ratio.lambda(0.0) {
-            Some((value, error)) if error.is_finite() => Ok(value),
-            _ => Err(InvalidShape::OutOfRange { field: FIELD, value: f64::INFINITY }),
-        }
-    };
-    let row = |r: &Vector<Dyadic>| Ok(DVec3::new(over(&r[0])?, over(&r[1])?, over(&r[2])?));
-    let t = vector(map.translation);
-    let shift = |r: &Vector<Dyadic>| over(&dot(r, &t).negated());
-    Ok(DAffine3 {
-        matrix3: DMat3::from_cols(row(&rows[0])?, row(&rows[1])?, row(&rows[2])?).transpose(),
-        translation: DVec3::new(shift(&rows[0])?, shift(&rows[1])?, shift(&rows[2])?),
-    })
 }
 
 /// At least |Mv|/|v| for every v, exact but for rounding where M turns and scales along its own axes: ‖M‖² is at most the
@@ -122,65 +129,37 @@ fn largest_stretch(m: &DMat3) -> f64 {
     ldexp((rows.max_element() * (1.0 + 64.0 * U)).sqrt() * (1.0 + 4.0 * U), -k)
 }
 
-/// A ray's image: rounded, what rounding took away, and a bound on what even that leaves out.
-struct Image {
-    ray: Ray,
-    origin_low: DVec3,
-    direction_low: DVec3,
-    origin_error: f64,
-    direction_error: f64,
-}
+/// λ of the exact image is at most this many times further from that of the rounded one than the point moves, in lengths
+/// of the direction, unless the ray grazes by less than its inverse: how far outside the interval hits are looked for.
+const REACH: f64 = power(20);
 
-fn image(map: &DAffine3, ray: &Ray) -> Image {
-    cpu::dispatch(
-        #[inline(always)]
-        || image_with::<Fused>(map, ray),
-        #[inline(always)]
-        || image_with::<Split>(map, ray),
-    )
-}
-
-#[inline(always)]
-fn image_with<P: Product>(map: &DAffine3, ray: &Ray) -> Image {
-    let m = map.matrix3;
-    let row = |i: usize, v: DVec3, t: f64| sum::<P>([m.x_axis[i], m.y_axis[i], m.z_axis[i]], v, t);
-    let o = [0, 1, 2].map(|i| row(i, ray.origin, map.translation[i]));
-    let d = [0, 1, 2].map(|i| row(i, ray.direction, 0.0));
-    let part =
-        |v: &[(f64, f64, f64); 3], pick: fn(&(f64, f64, f64)) -> f64| DVec3::new(pick(&v[0]), pick(&v[1]), pick(&v[2]));
-    // Each low part is a sum of up to seven terms of at most u of the sizes, rounded at most five times; products and
-    // their errors may have underflowed.
-    let left_out = |v: &[(f64, f64, f64); 3]| 32.0 * U * U * (v[0].2 + v[1].2 + v[2].2) + 64.0 * f64::from_bits(1);
-    Image {
-        ray: Ray { origin: part(&o, |v| v.0), direction: part(&d, |v| v.0) },
-        origin_low: part(&o, |v| v.1),
-        direction_low: part(&d, |v| v.1),
-        origin_error: left_out(&o),
-        direction_error: left_out(&d),
-    }
-}
-
-/// r·v + t in double-double, and the sum of the terms' absolute values.
-#[inline(always)]
-fn sum<P: Product>(r: [f64; 3], v: DVec3, t: f64) -> (f64, f64, f64) {
-    let (x, x_lo) = P::two_product(r[0], v.x);
-    let (y, y_lo) = P::two_product(r[1], v.y);
-    let (z, z_lo) = P::two_product(r[2], v.z);
-    let (xy, e) = two_sum(x, y);
-    let (zt, f) = two_sum(z, t);
-    let (s, g) = two_sum(xy, zt);
-    let (hi, lo) = two_sum(s, ((e + f) + g) + ((x_lo + y_lo) + z_lo));
-    (hi, lo, (x.abs() + y.abs()) + (z.abs() + t.abs()))
-}
-
-/// |v|₁ ≥ |v|.
-fn norm(v: DVec3) -> f64 {
-    v.abs().element_sum()
+/// How far λ near `limit` may move.
+fn reach(image: &Image, limit: f64) -> f64 {
+    let origin = taxicab(image.origin_low) + image.origin_error;
+    let direction = taxicab(image.direction_low) + image.direction_error;
+    let by = REACH * (origin + limit.abs() * direction) / image.ray.direction.abs().max_element();
+    // An infinite limit stays where it is.
+    if by.is_finite() { by } else { 0.0 }
 }
 
 impl<S: Shape> Affine<S> {
-    fn object_ray(&self, world_ray: &Ray) -> Ray {
-        image(&self.object_from_world, world_ray).ray
+    #[inline]
+    fn innermost(&self) -> &dyn Shape {
+        self.shape.seen_through().map_or(&self.shape, |(shape, _)| shape)
+    }
+
+    fn image(&self, world_ray: &Ray) -> Image {
+        self.innermost_from_world.image(world_ray)
+    }
+
+    /// Mᵀn.
+    fn across(&self, object_normal: DVec3) -> DVec3 {
+        self.innermost_from_world.leading().matrix3.transpose() * object_normal
+    }
+
+    /// Mᵀn, a unit vector.
+    fn world_normal(&self, object_normal: DVec3) -> DVec3 {
+        unit(self.across(object_normal)).unwrap_or(object_normal)
     }
 
     /// How far λ of `hit` moves from the rounded image to the exact one, and a bound on how far that is off.
@@ -189,23 +168,25 @@ impl<S: Shape> Affine<S> {
     /// and d, and by the surface's curvature. Where the ray grazes too closely for that, both hits lie in the shape's
     /// box. docs/numerics.md §8.
     fn shift(&self, image: &Image, hit: &Hit) -> (f64, f64) {
+        let shape = self.innermost();
         let (ray, lambda) = (&image.ray, hit.lambda);
         let low = lambda * image.direction_low;
         let e = image.origin_low + low;
         let unknown = image.origin_error
             + lambda.abs() * image.direction_error
-            + 4.0 * U * (norm(image.origin_low) + norm(low))
-            + hit.error * norm(image.direction_low);
-        let (size, e_size) = (norm(ray.direction), norm(e));
+            + 4.0 * U * (taxicab(image.origin_low) + taxicab(low))
+            + hit.error * taxicab(image.direction_low);
+        let (size, e_size) = (taxicab(ray.direction), taxicab(e));
         if e_size == 0.0 && unknown == 0.0 {
             return (0.0, 0.0);
         }
-        let n = self.shape.normal(ray, hit);
-        let curvature = self.shape.curvature(ray, hit);
-        let normal_error = self.shape.normal_error(ray, hit) + curvature * (hit.error * size + e_size + unknown);
-        let (slope, slope_low, slope_size) = sum::<Split>(n.to_array(), ray.direction, n.dot(image.direction_low));
+        let n = shape.normal(ray, hit);
+        let curvature = shape.curvature(ray, hit);
+        let normal_error = shape.normal_error(ray, hit) + curvature * (hit.error * size + e_size + unknown);
+        let (slope, slope_low, slope_rounding) =
+            sum::<Split>(n.to_array(), ray.direction, 0.0, n.dot(image.direction_low));
         let slope = slope + slope_low;
-        let slope_error = normal_error * size + 4.0 * U * (slope.abs() + U * slope_size) + image.direction_error;
+        let slope_error = normal_error * size + 4.0 * U * slope.abs() + slope_rounding + image.direction_error;
         let least_slope = slope.abs() - slope_error;
         let shift = -n.dot(e) / slope;
         let first = (unknown + (normal_error + 4.0 * U) * e_size + shift.abs() * slope_error) / least_slope;
@@ -219,84 +200,172 @@ impl<S: Shape> Affine<S> {
         if sound {
             return (shift, error);
         }
-        let bounds = self.shape.bounds();
-        let widest = 2.0 * (norm(bounds.size()) + e_size + unknown) / ray.direction.abs().max_element();
+        let bounds = shape.bounds();
+        let widest = 2.0 * (taxicab(bounds.size()) + e_size + unknown) / ray.direction.abs().max_element();
         (0.0, if widest.is_finite() { widest } else { f64::INFINITY })
     }
+
+    /// Next to a limit: the first hit of which the corrected λ lies inside `within`. Where that is not known, the rounded
+    /// image decides.
+    #[cold]
+    #[inline(never)]
+    fn next_to_limit(&self, image: &Image, within: Interval) -> Option<Hit> {
+        let mut zone = widened(image, within);
+        loop {
+            let hit = self.innermost().intersect(&image.ray, zone)?;
+            match self.place(image, &hit, within, zone.min) {
+                Place::Before => {}
+                Place::Inside(hit) => return Some(hit),
+                Place::Beyond => return None,
+            }
+            zone.min = past(&hit, zone);
+        }
+    }
+
+    /// Where the corrected λ of `hit`, the first of the rounded image beyond `from`, lies against `within`.
+    fn place(&self, image: &Image, hit: &Hit, within: Interval, from: f64) -> Place {
+        let (shift, error) = self.shift(image, hit);
+        let [hi, lo] = self.innermost().precise_lambda(&image.ray, hit);
+        // To a hundred bits but for `error`; λ + Δ − limit.
+        let beyond = |limit: f64| {
+            if limit.is_infinite() {
+                return (-limit, 0.0);
+            }
+            let (difference, rest) = two_diff(hi, limit);
+            let rest = rest + (lo + shift);
+            let unknown = error + power(-90) * hi.abs() + 8.0 * U * (rest.abs() + lo.abs() + shift.abs());
+            (difference + rest, unknown * INFLATE + U * (difference + rest).abs())
+        };
+        let ((after, after_error), (before, before_error)) = (beyond(within.min), beyond(within.max));
+        if after < -after_error {
+            return Place::Before;
+        }
+        if before > before_error {
+            return Place::Beyond;
+        }
+        if !(after > after_error && before < -before_error) {
+            let decided = self.innermost().intersect(&image.ray, Interval { min: from.max(within.min), ..within });
+            if decided.is_none_or(|d| d.part != hit.part || d.lambda != hit.lambda) {
+                return if after > after_error { Place::Beyond } else { Place::Before };
+            }
+        }
+        let exact = hit.lambda + shift;
+        let lambda = exact.max(within.min).min(within.max);
+        let error = (hit.error + error + U * lambda.abs() + (exact - lambda).abs()) * INFLATE;
+        Place::Inside(Hit { lambda, error, ..*hit })
+    }
+}
+
+/// Where a hit lies against an interval.
+enum Place {
+    Before,
+    Inside(Hit),
+    Beyond,
+}
+
+/// Beyond the λ of `hit`, which lies inside `zone`.
+fn past(hit: &Hit, zone: Interval) -> f64 {
+    (hit.lambda + 2.0 * hit.error).max(zone.min.next_up())
+}
+
+/// `within`, and as much on either side of it as λ may move.
+fn widened(image: &Image, within: Interval) -> Interval {
+    Interval { min: within.min - reach(image, within.min), max: within.max + reach(image, within.max) }
 }
 
 impl<S: Shape> Shape for Affine<S> {
     fn intersect(&self, world_ray: &Ray, within: Interval) -> Option<Hit> {
-        let image = image(&self.object_from_world, world_ray);
-        let hit = self.shape.intersect(&image.ray, within)?;
+        if within.is_empty() {
+            return None;
+        }
+        let image = self.image(world_ray);
+        let zone = widened(&image, within);
+        let hit = match self.shape.seen_through() {
+            None => self.shape.intersect(&image.ray, zone),
+            Some((innermost, _)) => innermost.intersect(&image.ray, zone),
+        }?;
         let (shift, error) = self.shift(&image, &hit);
-        // Decided for the image, λ stays in its interval.
-        let lambda = (hit.lambda + shift).max(within.min).min(within.max);
-        let clamped = (hit.lambda + shift - lambda).abs();
-        let error = (hit.error + error + U * lambda.abs() + clamped) * INFLATE;
-        Some(Hit { lambda, error, ..hit })
+        let lambda = hit.lambda + shift;
+        let error = (hit.error + error + U * lambda.abs()) * INFLATE;
+        if lambda - error > within.min && lambda + error < within.max {
+            return Some(Hit { lambda, error, ..hit });
+        }
+        self.next_to_limit(&image, within)
     }
 
     fn normal(&self, world_ray: &Ray, hit: &Hit) -> DVec3 {
-        self.world_normal(self.shape.normal(&self.object_ray(world_ray), hit))
+        self.world_normal(self.innermost().normal(&self.object_ray(world_ray), hit))
     }
 
     fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    fn occludes(&self, world_ray: &Ray, within: Interval) -> bool {
-        self.shape.occludes(&self.object_ray(world_ray), within)
+    fn seen_through(&self) -> Option<(&dyn Shape, &Map)> {
+        Some((self.innermost(), &self.innermost_from_world))
     }
 
     fn shading_normal(&self, world_ray: &Ray, hit: &Hit) -> DVec3 {
-        self.world_normal(self.shape.shading_normal(&self.object_ray(world_ray), hit))
+        self.world_normal(self.innermost().shading_normal(&self.object_ray(world_ray), hit))
     }
 
     fn texture_coordinates(&self, world_ray: &Ray, hit: &Hit) -> DVec2 {
-        self.shape.texture_coordinates(&self.object_ray(world_ray), hit)
+        self.innermost().texture_coordinates(&self.object_ray(world_ray), hit)
     }
 
     fn point(&self, world_ray: &Ray, hit: &Hit) -> SurfacePoint {
         let object_ray = self.object_ray(world_ray);
-        let SurfacePoint { position, error } = self.shape.point(&object_ray, hit);
-        let (w, t) = (self.world_from_object.matrix3, self.world_from_object.translation);
-        let row = |i: usize| sum::<Split>([w.x_axis[i], w.y_axis[i], w.z_axis[i]], position, t[i]);
-        let rows = [row(0), row(1), row(2)];
-        let world = DVec3::new(rows[0].0, rows[1].0, rows[2].0);
+        let SurfacePoint { position, error } = self.innermost().point(&object_ray, hit);
+        let (w, t) = (self.world_from_innermost.matrix3, self.world_from_innermost.translation);
+        let row = |i: usize| sum::<Split>([w.x_axis[i], w.y_axis[i], w.z_axis[i]], position, t[i], 0.0);
+        let world = DVec3::new(row(0).0, row(1).0, row(2).0);
         // The map's entries are rounded, and so is the sum.
-        let rounding = U * (norm(world) + rows.iter().map(|r| 2.0 * r.2).sum::<f64>());
+        let size =
+            w.x_axis.abs() * position.x.abs() + w.y_axis.abs() * position.y.abs() + w.z_axis.abs() * position.z.abs();
+        let rounding = U * (taxicab(world) + 2.0 * taxicab(size + t.abs()));
         // An object-space error ε is at most ‖W‖ε here; along the normal, where it lies, it is ε/|Mᵀn|.
         let stretched = error * self.norms[1];
-        let n = self.object_from_world.matrix3.transpose() * self.shape.normal(&object_ray, hit);
-        let across = 1.01 * error / n.length();
+        let across = 1.01 * error / self.across(self.innermost().normal(&object_ray, hit)).length();
         let bends = self.curvature(world_ray, hit) * across;
         let off = if bends < 0.005 && across < stretched { across } else { stretched };
         SurfacePoint { position: world, error: (off + rounding) * INFLATE }
     }
 
     fn departs(&self, world_ray: &Ray, hit: &Hit, outward: bool) -> bool {
-        self.shape.departs(&self.object_ray(world_ray), hit, outward)
+        let image = self.image(world_ray);
+        if !self.innermost().departs(&image.ray, hit, outward) {
+            return false;
+        }
+        // Behind the rounded image's origin, and before the exact one's? Only what was left may be there.
+        let mut zone = Interval { min: -reach(&image, 0.0), max: f64::from_bits(1) };
+        while let Some(behind) = self.innermost().intersect(&image.ray, zone) {
+            let left = matches!(self.place(&image, &behind, Interval::FORWARD, zone.min), Place::Before);
+            if !left && behind.part == hit.part {
+                return false;
+            }
+            zone.min = past(&behind, zone);
+        }
+        true
     }
 
     fn curvature(&self, world_ray: &Ray, hit: &Hit) -> f64 {
         let object_ray = self.object_ray(world_ray);
-        let n = self.object_from_world.matrix3.transpose() * self.shape.normal(&object_ray, hit);
+        let across = self.across(self.innermost().normal(&object_ray, hit)).length();
         // κ‖M‖²/|Mᵀn|, in an order that stays in range.
-        self.shape.curvature(&object_ray, hit) * self.norms[0] * (self.norms[0] / n.length())
+        self.innermost().curvature(&object_ray, hit) * self.norms[0] * (self.norms[0] / across)
     }
 
     fn normal_error(&self, world_ray: &Ray, hit: &Hit) -> f64 {
         let object_ray = self.object_ray(world_ray);
-        let n = self.object_from_world.matrix3.transpose() * self.shape.normal(&object_ray, hit);
+        let across = self.across(self.innermost().normal(&object_ray, hit)).length();
         // |δ(Mᵀn)| ≤ ‖M‖(|δn| + a few u); of it only what is across Mᵀn turns the unit vector.
-        let error = self.shape.normal_error(&object_ray, hit) + 8.0 * U;
-        1.01 * error * (self.norms[0] / n.length()) + 8.0 * U
+        let error = self.innermost().normal_error(&object_ray, hit) + 8.0 * U;
+        1.01 * error * (self.norms[0] / across) + 8.0 * U
     }
 
     fn precise_lambda(&self, world_ray: &Ray, hit: &Hit) -> [f64; 2] {
-        let image = image(&self.object_from_world, world_ray);
-        let [hi, lo] = self.shape.precise_lambda(&image.ray, hit);
+        let image = self.image(world_ray);
+        let [hi, lo] = self.innermost().precise_lambda(&image.ray, hit);
         let (shift, _) = self.shift(&image, hit);
         let (hi, rest) = two_sum(hi, shift);
         let (hi, lo) = two_sum(hi, lo + rest);

@@ -1,5 +1,6 @@
 //! What a ray can meet.
 
+use crate::kernel::map::Map;
 use crate::{Aabb, Hit, Interval, Ray};
 use glam::{DAffine3, DVec2, DVec3};
 use std::fmt::Debug;
@@ -83,6 +84,12 @@ pub trait Shape: Debug + Send + Sync {
         8.0 * f64::EPSILON
     }
 
+    /// The shape and the map, if this is another shape seen through an affine map (from the world to its frame): a chain of
+    /// [`Affine`](crate::Affine)s takes a ray to the innermost shape in one step. None by default.
+    fn seen_through(&self) -> Option<(&dyn Shape, &Map)> {
+        None
+    }
+
     /// λ of `hit` to about a hundred bits, as an unevaluated sum of two floats: what [`Scene`](crate::Scene) compares
     /// when two objects' hits lie within their bounds of each other. The default knows no more than the hit.
     fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {
@@ -136,6 +143,9 @@ macro_rules! forward_shape {
             }
             fn normal_error(&self, ray: &Ray, hit: &Hit) -> f64 {
                 (**self).normal_error(ray, hit)
+            }
+            fn seen_through(&self) -> Option<(&dyn Shape, &Map)> {
+                (**self).seen_through()
             }
             fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {
                 (**self).precise_lambda(ray, hit)

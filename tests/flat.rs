@@ -517,9 +517,7 @@ fn show(kernel: Kernel, number: u32, name: &str, row: &Row) {
 fn affine_maps_in_every_family() {
     for family in families::all().into_iter().filter(|f| f.kernel == Kernel::Affine) {
         let mut row = Row::default();
-        // Each of twenty nested maps asks all those inside it.
-        let cases = if family.number == 72 { 800 } else { 4000 };
-        for i in 0..cases {
+        for i in 0..2000 {
             let case = as_stored(family.case(i));
             let Some(Ok(affine)) = shape(&case.solid) else { unreachable!() };
             let hit = affine.intersect(&case.ray, case.within);
@@ -527,14 +525,7 @@ fn affine_maps_in_every_family() {
         }
         show(Kernel::Affine, family.number, family.name, &row);
         assert_eq!((row.wrong(), row.violations), (0, 0), "{}", family.name);
-        // Ordinary rays. One that grazes, or starts on the surface, moves by many ulps when it is rounded, and the bound
-        // says so; a normal good to its last place settles λ to a few ulps where the map stretches by 1e16.
-        let contract = match family.number {
-            0 | 67 | 68 | 71 | 73 | 85 => 4.0,
-            66 | 70 => 64.0,
-            _ => f64::INFINITY,
-        };
-        assert!(row.max_ulps() <= contract, "{}", family.name);
+        assert!(row.max_ulps() <= family.contract(), "{}", family.name);
         assert!(row.hits > 300, "{}", family.name);
     }
 }

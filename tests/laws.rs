@@ -6,12 +6,13 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, TestCaseError, TestRunner};
 use std::cell::Cell;
 use std::sync::Arc;
-use support::big::{Big, Big3};
+use support::big::Big3;
 use support::cases::{Case, Family, Solid};
 use support::families;
 use support::rng::Rng;
 use support::shapes::shape;
 use truehit::glam::{DAffine3, DMat3, DVec2, DVec3};
+use truehit::kernel::map::Map;
 use truehit::{Aabb, Affine, Hit, Interval, Ray, Shape, SurfacePoint};
 
 /// Runs `law` on `cases` random cases of all families whose solid is a shape; half of them ordinary rays. At least a
@@ -78,9 +79,7 @@ fn flat_normal(solid: &Solid) -> Option<DVec3> {
         }
         _ => return None,
     };
-    let top = exact.0.iter().filter(|x| !x.is_zero()).map(Big::exponent).max()?;
-    let scale = Big::from(2f64.powi(-(top / 2))) * Big::from(2f64.powi(-(top - top / 2)));
-    Some(DVec3::from(exact.0.map(|x| (x * &scale).to_f64())).normalize())
+    exact.direction()
 }
 
 #[test]
@@ -247,7 +246,7 @@ fn the_identity_map_changes_nothing_and_exact_maps_nest() {
 
 /// No method of this shape answers as the trait's defaults would.
 #[derive(Debug)]
-struct Probe;
+struct Probe(Map);
 
 impl Shape for Probe {
     fn intersect(&self, _: &Ray, _: Interval) -> Option<Hit> {
@@ -280,13 +279,22 @@ impl Shape for Probe {
     fn precise_lambda(&self, _: &Ray, _: &Hit) -> [f64; 2] {
         [14.0, 15.0]
     }
+    fn bounds_under(&self, _: &DAffine3) -> Aabb {
+        Aabb::new([16.0; 3], [17.0; 3])
+    }
+    fn normal_error(&self, _: &Ray, _: &Hit) -> f64 {
+        18.0
+    }
+    fn seen_through(&self) -> Option<(&dyn Shape, &Map)> {
+        Some((self, &self.0))
+    }
 }
 
 fn everything(shape: impl Shape) -> String {
     let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
     let hit = shape.intersect(&ray, Interval::FORWARD).unwrap();
     format!(
-        "{hit:?} {} {:?} {} {} {} {:?} {} {} {:?}",
+        "{hit:?} {} {:?} {} {} {} {:?} {} {} {:?} {:?} {} {:?}",
         shape.normal(&ray, &hit),
         shape.bounds(),
         shape.occludes(&ray, Interval::FORWARD),
@@ -296,17 +304,21 @@ fn everything(shape: impl Shape) -> String {
         shape.departs(&ray, &hit, true),
         shape.curvature(&ray, &hit),
         shape.precise_lambda(&ray, &hit),
+        shape.bounds_under(&DAffine3::IDENTITY),
+        shape.normal_error(&ray, &hit),
+        shape.seen_through(),
     )
 }
 
 #[test]
 fn pointers_forward_every_method() {
-    let value = everything(Probe);
-    assert_eq!(everything(&Probe), value);
-    assert_eq!(everything(Box::new(Probe)), value);
-    assert_eq!(everything(Arc::new(Probe)), value);
-    assert_eq!(everything(Box::new(Probe) as Box<dyn Shape>), value);
-    assert_eq!(everything(Arc::new(Probe) as Arc<dyn Shape>), value);
-    assert_eq!(everything(&Probe as &dyn Shape), value);
-    assert_eq!(everything(Arc::new(Box::new(Probe) as Box<dyn Shape>)), value);
+    let probe = || Probe(DAffine3::IDENTITY.into());
+    let value = everything(probe());
+    assert_eq!(everything(&probe()), value);
+    assert_eq!(everything(Box::new(probe())), value);
+    assert_eq!(everything(Arc::new(probe())), value);
+    assert_eq!(everything(Box::new(probe()) as Box<dyn Shape>), value);
+    assert_eq!(everything(Arc::new(probe()) as Arc<dyn Shape>), value);
+    assert_eq!(everything(&probe() as &dyn Shape), value);
+    assert_eq!(everything(Arc::new(Box::new(probe()) as Box<dyn Shape>)), value);
 }

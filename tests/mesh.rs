@@ -306,6 +306,40 @@ fn t_junctions_crack_only_where_they_really_do() {
     assert_eq!((met, cracked), (through, 0));
 }
 
+/// Where the middle was rounded away from the upper triangle, the input has a gap less than an ulp wide: rays through it
+/// miss, as they should, and no others do.
+#[test]
+fn a_torn_t_junctions_gap_is_seen() {
+    let mut random = Random(8);
+    let side = |p: DVec3, a: DVec3, b: DVec3, d: DVec3| (b - a).cross(p - a).dot(d);
+    let (mut rays, mut through) = ([0; 2], [0; 2]);
+    for _ in 0..400 {
+        let coarse = |v: DVec3| (v * 1_048_576.0).round() / 1_048_576.0;
+        let (a, b) = (coarse(random.in_cube()), coarse(random.in_cube()));
+        let middles = [0.5 * (a + b), a + (b - a) / 3.0];
+        for (torn, middle) in middles.into_iter().enumerate() {
+            let mesh = t_junction(middle, a, b);
+            for _ in 0..50 {
+                // From so near that the directions tell points inside the gap apart; not along the surface.
+                let d = 1e-3 * random.direction();
+                if side(a + b + DVec3::new(0.3, 0.2, 1.0), a, b, d) * side(a - b - DVec3::new(0.3, 0.2, 1.0), a, b, d)
+                    >= 0.0
+                {
+                    continue;
+                }
+                let ray = Ray::new(middle - d, d);
+                let hit = mesh.intersect(&ray, Interval::FORWARD);
+                assert_eq!(hit, brute_force(&mesh, &ray, Interval::FORWARD));
+                rays[torn] += 1;
+                through[torn] += usize::from(hit.is_none());
+            }
+        }
+    }
+    println!("missed: {} of {} at sound junctions, {} of {} at torn ones", through[0], rays[0], through[1], rays[1]);
+    assert!(rays[0] > 5000 && rays[1] > 5000);
+    assert!(through[0] == 0 && through[1] > 50);
+}
+
 #[test]
 fn a_quads_diagonal_holds() {
     let corners =

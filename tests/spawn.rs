@@ -166,6 +166,13 @@ impl Tally {
         }
     }
 
+    fn counts(&self) -> String {
+        let Self { spawned, outward, shadows, rehits, skipped, lost, .. } = self;
+        format!(
+            "{spawned} spawned ({outward} outward), {shadows} shadow rays, {rehits} re-hits, {skipped} skipped, {lost} lost"
+        )
+    }
+
     fn merge(&mut self, other: Self) {
         self.spawned += other.spawned;
         self.outward += other.outward;
@@ -188,15 +195,22 @@ fn sweep(rays: usize) {
             scope.spawn(|| {
                 loop {
                     let n = next.fetch_add(1, Ordering::Relaxed);
-                    let (job, chunk) = (n / chunks, n % chunks);
-                    let Some(&(place, kernel)) = jobs.get(job) else { break };
+                    // All shapes and places side by side, so that what a run has done so far is a fair part of it.
+                    let (job, chunk) = (n % jobs.len(), n / jobs.len());
+                    if chunk >= chunks {
+                        break;
+                    }
+                    let (place, kernel) = jobs[job];
                     let mut tally = Tally::default();
                     for i in chunk * CHUNK..((chunk + 1) * CHUNK).min(rays) {
                         tally.spawn(place, kernel, &mut Rng::new(((job as u64) << 40) + i as u64), i);
                     }
-                    tallies.lock().unwrap()[job].merge(tally);
-                    if chunk % 1000 == 999 {
-                        eprintln!("{} {}: {} of {chunks} chunks", place.name, kernel.name(), chunk + 1);
+                    let mut tallies = tallies.lock().unwrap();
+                    tallies[job].merge(tally);
+                    if n % 2000 == 1999 {
+                        let mut total = Tally::default();
+                        tallies.iter().for_each(|t| total.merge(t.clone()));
+                        eprintln!("so far: {}", total.counts());
                     }
                 }
             });
@@ -218,10 +232,7 @@ fn sweep(rays: usize) {
         );
         total.merge(t.clone());
     }
-    println!(
-        "{} spawned, {} shadow rays, {} re-hits, {} skipped, {} lost",
-        total.spawned, total.shadows, total.rehits, total.skipped, total.lost
-    );
+    println!("{}", total.counts());
     for ((place, kernel), t) in jobs.iter().zip(&tallies) {
         assert!(t.spawned * 5 > rays, "{} {}: only {} spawned", place.name, kernel.name(), t.spawned);
         assert_eq!((t.rehits, t.skipped, t.lost), (0, 0, 0), "{} {}: {:?}", place.name, kernel.name(), t.first);
@@ -233,9 +244,10 @@ fn spawned_rays_leave() {
     sweep(4000);
 }
 
-/// `cargo test --release --test spawn -- --ignored --nocapture`: 1e8 spawned rays and as many shadow rays.
+/// `cargo test --release --test spawn -- --ignored --nocapture`: 1e8 spawned rays and half as many shadow rays; other
+/// numbers of rays at each shape by the environment variable `TRUEHIT_CASES`.
 #[test]
 #[ignore = "half an hour or so"]
 fn a_hundred_million_spawned_rays_leave() {
-    sweep(7_000_000);
+    sweep(support::cases_wanted(7_000_000));
 }

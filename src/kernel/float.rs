@@ -30,7 +30,7 @@ pub fn ldexp(x: f64, e: i32) -> f64 {
 /// 2^e, −1022 ≤ e ≤ 1023.
 #[inline(always)]
 #[must_use]
-pub fn power(e: i32) -> f64 {
+pub const fn power(e: i32) -> f64 {
     f64::from_bits(((e + 1023) as u64) << 52)
 }
 

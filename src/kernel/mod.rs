@@ -8,6 +8,7 @@ pub mod eft;
 mod fixed;
 pub mod float;
 pub mod frustum;
+pub mod map;
 pub mod number;
 mod pair;
 pub mod plane;

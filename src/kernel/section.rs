@@ -220,7 +220,8 @@ pub(super) fn fine(ray: &Ray, extent: f64) -> f64 {
 /// What [`precise`] promises: exact arithmetic and the few operations after it reach 2⁻⁹⁸.
 const PRECISE: f64 = f64::from_bits((1023 - 94) << 52); // 2⁻⁹⁴
 
-/// Of two ends the λ nearest to `lambda`, to a hundred bits; undecided where this arithmetic knows less.
+/// Of two ends the λ nearest to `lambda`, the first if it is within an ulp (next to an apex both may be), to a hundred bits;
+/// undecided where this arithmetic knows less.
 pub(super) fn precise<N: Number>(ends: &[End<N>; 2], lambda: f64) -> Result<[f64; 2], Undecided> {
     let (enter, exit) = (ends[0].lambda(), ends[1].lambda());
     // A NaN is not below it.
@@ -230,7 +231,9 @@ pub(super) fn precise<N: Number>(ends: &[End<N>; 2], lambda: f64) -> Result<[f64
     }
     let at = Scaled::new(lambda, 0.0, 0);
     let (from_enter, from_exit) = (enter.exact.minus(at).abs(), exit.exact.minus(at).abs());
-    let nearest = if from_exit.minus(from_enter).is_negative() { exit } else { enter };
+    let ulp = Scaled::new(2.0 * super::bound::U * lambda.abs(), 0.0, 0);
+    let is_enter = from_enter.minus(ulp).is_negative() || !from_exit.minus(from_enter).is_negative();
+    let nearest = if is_enter { enter } else { exit };
     let (hi, lo) = nearest.exact.to_pair();
     Ok([hi, lo])
 }

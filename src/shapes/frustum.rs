@@ -20,12 +20,16 @@ pub(super) struct Frustum {
 /// Where λ's own error moves a point by more than this part of the local radius, λ is asked for to a hundred bits.
 const SHARP: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// A hit's point taken apart, in local units: base + height·axis + radial.
+/// A hit's point taken apart, in local units: end + along·axis + radial, from the nearer end, so that a rim and an apex
+/// are met with their own rounding only.
 struct Foot {
     local: Local,
     /// top − base.
     axis: DVec3,
-    /// 0 at the base, 1 at the top, never beyond.
+    end: DVec3,
+    /// From the base 0 to 1, from the top −1 to 0.
+    along: f64,
+    /// From the base to the top, 0 to 1.
     height: f64,
     /// Perpendicular to the axis; as long as the point's distance from it before any projection.
     radial: DVec3,
@@ -79,13 +83,20 @@ impl Frustum {
         let (r0, r1) = (local.length(self.base_radius), local.length(self.top_radius));
         let axis = local.vector(self.top) - local.vector(self.base);
         let foot = |lambda| {
-            let x = local.offset(ray, lambda, self.base);
-            let height = along(x, axis);
+            let from_base = local.offset(ray, lambda, self.base);
+            let height = along(from_base, axis);
+            let (end, x, at, r) = if height <= 0.5 {
+                (self.base, from_base, height, r0)
+            } else {
+                let from_top = local.offset(ray, lambda, self.top);
+                (self.top, from_top, along(from_top, axis), r1)
+            };
             // Twice: what the first subtraction rounds along the axis, the second removes.
-            let radial = x - height * axis;
+            let radial = x - at * axis;
             let radial = radial - along(radial, axis) * axis;
-            let height = height.clamp(0.0, 1.0);
-            Foot { local, axis, height, radial, radius: r0 + height * (r1 - r0) }
+            let at = if height <= 0.5 { at.clamp(0.0, 1.0) } else { at.clamp(-1.0, 0.0) };
+            let height = if height <= 0.5 { at } else { 1.0 + at };
+            Foot { local, axis, end, along: at, height, radial, radius: r + at * (r1 - r0) }
         };
         let rough = foot([hit.lambda, 0.0]);
         let moved = local.length(hit.error * length(ray.direction));
@@ -127,12 +138,7 @@ impl Frustum {
             BASE => (self.base, clamped(r0)),
             TOP => (self.top, clamped(r1)),
             _ => {
-                // From the nearer end, so that a rim or an apex is met with its own rounding only.
-                let foot = if f.height <= 0.5 {
-                    self.base + f.local.vector_outside(f.height * f.axis)
-                } else {
-                    self.top - f.local.vector_outside((1.0 - f.height) * f.axis)
-                };
+                let foot = f.end + f.local.vector_outside(f.along * f.axis);
                 (foot, f.radius * unit(f.radial).unwrap_or(DVec3::ZERO))
             }
         };
@@ -204,6 +210,17 @@ impl Frustum {
         1.0 / f.local.outside(f.radius * (1.0 - 16.0 * U))
     }
 
+    /// The radial part is off by 8u of the distance from the nearer end; docs/numerics.md §6.
+    pub(super) fn normal_error(&self, ray: &Ray, hit: &Hit) -> f64 {
+        if hit.part == BASE || hit.part == TOP {
+            return 16.0 * U;
+        }
+        let f = self.foot(ray, hit);
+        // A part of the smallest subnormals has no digits.
+        let rounding = 8.0 * U * (length(f.radial) + length(f.along * f.axis)) + f64::from_bits(16);
+        16.0 * U + rounding / length(f.radial)
+    }
+
     /// Half of ∇f for f(p) = |x|² − t²/h² − R(t)², with x = p − base, t = x·v, v = top − base, h² = |v|².
     pub(super) fn gradient(&self, point: DVec3) -> DVec3 {
         let (v, x) = (self.top - self.base, point - self.base);
@@ -267,6 +284,10 @@ macro_rules! shape_by_frustum {
 
             fn curvature(&self, ray: &crate::Ray, hit: &crate::Hit) -> f64 {
                 self.0.curvature(ray, hit)
+            }
+
+            fn normal_error(&self, ray: &crate::Ray, hit: &crate::Hit) -> f64 {
+                self.0.normal_error(ray, hit)
             }
 
             fn precise_lambda(&self, ray: &crate::Ray, hit: &crate::Hit) -> [f64; 2] {

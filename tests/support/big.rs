@@ -190,6 +190,13 @@ impl Big3 {
     pub fn is_zero(&self) -> bool {
         self.0.iter().all(Big::is_zero)
     }
+
+    /// The unit vector along it, in floats; `None` for zero.
+    pub fn direction(&self) -> Option<DVec3> {
+        let top = self.0.iter().filter(|x| !x.is_zero()).map(Big::exponent).max()?;
+        let shifted = |x: &Big| Big { n: x.n.clone(), e: x.e - top }.to_f64();
+        Some(DVec3::from(self.0.each_ref().map(shifted)).normalize())
+    }
 }
 
 impl From<DVec3> for Big3 {

@@ -13,3 +13,11 @@ pub mod oracle;
 pub mod rng;
 pub mod shapes;
 pub mod sweep;
+
+/// How many cases a long sweep is to run: the environment variable `TRUEHIT_CASES`, or its own number.
+pub fn cases_wanted(own: usize) -> usize {
+    match std::env::var("TRUEHIT_CASES") {
+        Ok(text) => text.parse().expect("TRUEHIT_CASES is a number"),
+        Err(_) => own,
+    }
+}

@@ -306,93 +306,18 @@ pub fn slab(line: &Line, min: DVec3, max: DVec3) -> Option<[Real; 2]> {
     ends.filter(|[enter, exit]| compare(enter, exit).is_le())
 }
 
-/// Whether rounding the ray's image in an affine shape's frame can turn a hit into a miss: it does for one of the
-/// shape grown and the shape shrunk by what the rounding moves the ray, and not for the other.
-pub fn is_borderline(case: &Case) -> bool {
-    let Solid::Affine { object_from_world: map, inner, .. } = &case.solid else { return false };
-    let size = |v: DVec3| {
+/// The innermost solid of a chain of maps, and the exact image of the case's line in its frame, with P for each component
+/// of origin and direction: the sum of the absolute values that it is made of, as the maps multiply them.
+pub fn innermost(case: &Case) -> (&Solid, Line, [DVec3; 2]) {
+    let mut line = Line::from(&case.ray);
+    let (mut o, mut d) = (case.ray.origin.abs(), case.ray.direction.abs());
+    let mut solid = &case.solid;
+    while let Solid::Affine { object_from_world: map, inner, .. } = solid {
+        line = line.through(map);
         let m = map.matrix3;
-        m.x_axis.abs() * v.x.abs() + m.y_axis.abs() * v.y.abs() + m.z_axis.abs() * v.z.abs()
-    };
-    let (o, d) = (map.transform_point3(case.ray.origin), map.transform_vector3(case.ray.direction));
-    let extent = match **inner {
-        Solid::Sphere { center, radius } => center.length() + radius,
-        Solid::Frustum { base, top, base_radius, top_radius } => {
-            base.length() + top.length() + base_radius.max(top_radius)
-        }
-        Solid::Triangle(v) => v.iter().map(|p| p.length()).sum(),
-        Solid::Plane { point, .. } => point.length() + o.length(),
-        _ => return false,
-    };
-    let reach = (o.length() + extent) / d.length();
-    let u = 8.0 * f64::EPSILON;
-    let off =
-        u * (size(case.ray.origin) + map.translation.abs()).length() + u * reach * size(case.ray.direction).length();
-    let line = Line::from(&case.ray).through(map);
-    // Limits on λ give way as the surface does.
-    let widened = |by: f64| Interval::new(case.within.min - by, case.within.max + by);
-    let slack = off / d.length() * 1e6;
-    let grown = match **inner {
-        Solid::Sphere { center, radius } => [radius + off, radius - off].map(|radius| Solid::Sphere { center, radius }),
-        Solid::Frustum { base, top, base_radius, top_radius } => [off, -off].map(|off| {
-            let axis = (top - base).normalize() * off;
-            // Off the wall, which leans: more than off in the radius.
-            let lean = 1.0 + (top_radius - base_radius).abs() / (top - base).length();
-            Solid::Frustum {
-                base: base - axis,
-                top: top + axis,
-                base_radius: (base_radius + 2.0 * off * lean).max(0.0),
-                top_radius: (top_radius + 2.0 * off * lean).max(0.0),
-            }
-        }),
-        Solid::Triangle(v) => {
-            let n = (v[1] - v[0]).cross(v[2] - v[0]).normalize();
-            // As seen along d: the edges' lines moved by off.
-            let center = (v[0] + v[1] + v[2]) / 3.0;
-            let inner_radius = (v[1] - v[0]).cross(v[2] - v[0]).length()
-                / (v[1] - v[0]).length().max((v[2] - v[0]).length()).max((v[2] - v[1]).length())
-                / 3.0;
-            let lean = d.length() / n.dot(d).abs();
-            let k = off * lean * 4.0 / inner_radius;
-            [1.0 + k, 1.0 - k].map(|k| Solid::Triangle(v.map(|p| center + (p - center) * k)))
-        }
-        Solid::Plane { normal, .. } => {
-            return normal.normalize().dot(d).abs() * reach <= off || near_limit(inner, &line, case.within, slack);
-        }
-        _ => return false,
-    };
-    if near_limit(inner, &line, case.within, slack) {
-        return true;
+        let grown = |v: DVec3| m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z;
+        (o, d) = (grown(o) + map.translation.abs(), grown(d));
+        solid = inner;
     }
-    let [large, small] = grown.map(|s| {
-        let by = if slack.is_finite() { slack } else { 0.0 };
-        (solid(&s, &line, widened(by)).is_some(), solid(&s, &line, widened(-by)).is_some())
-    });
-    large.0 != small.1 || off * 4.0 > extent
-}
-
-/// Whether a λ at which the line meets the surface is within `slack` of a limit.
-fn near_limit(inner: &Solid, line: &Line, within: Interval, slack: f64) -> bool {
-    ends(inner, line).iter().any(|t| {
-        let lambda = t.lambda.enclosure().to_f64();
-        (lambda - within.min).abs() <= slack || (lambda - within.max).abs() <= slack
-    })
-}
-
-/// Every λ at which the line meets the surface, wherever it lies.
-pub fn ends(solid_: &Solid, line: &Line) -> Vec<Truth> {
-    let both = |ends: Option<[Truth; 2]>| ends.map_or(Vec::new(), Vec::from);
-    match solid_ {
-        Solid::Sphere { center, radius } => {
-            both(sphere(line, *center, *radius).map(|ends| ends.map(|lambda| Truth { lambda, parts: [0; 4] })))
-        }
-        Solid::Frustum { base, top, base_radius, top_radius } => {
-            both(frustum(line, *base, *top, *base_radius, *top_radius))
-        }
-        Solid::Affine { object_from_world, inner, .. } => {
-            let line = line.through(object_from_world);
-            if line.d.is_zero() { Vec::new() } else { ends(inner, &line) }
-        }
-        flat => solid(flat, line, Interval::LINE).into_iter().collect(),
-    }
+    (solid, line, [o, d])
 }

@@ -1,8 +1,10 @@
 //! A case's solid as one of the crate's shapes.
 
+use super::big::Big;
 use super::cases::{Case, Solid};
+use super::oracle::innermost;
 use truehit::glam::DVec3;
-use truehit::{Affine, Cone, Cylinder, InvalidShape, Mesh, Plane, Polygon, Shape, Sphere, Triangle};
+use truehit::{Affine, Cone, Cylinder, InvalidShape, Mesh, Plane, Polygon, Ray, Shape, Sphere, Triangle};
 
 /// The shape, if there is one for this solid and its constructor takes it.
 pub fn shape(solid: &Solid) -> Option<Result<Box<dyn Shape>, InvalidShape>> {
@@ -41,4 +43,23 @@ pub fn as_stored(mut case: Case) -> Case {
         solid = inner;
     }
     case
+}
+
+/// The ray that an affine case is decided for. Panics if it is further from the exact image than is documented.
+pub fn object_ray(case: &Case) -> Ray {
+    let Solid::Affine { world_from_object, inner, .. } = &case.solid else { panic!("no map") };
+    let inner = shape(inner).expect("a shape").expect("a legal shape");
+    let ray = Affine::new(inner, *world_from_object).expect("an invertible map").object_ray(&case.ray);
+    let (_, line, sizes) = innermost(case);
+    let u = f64::EPSILON / 2.0;
+    for (rounded, exact, size) in [(ray.origin, &line.o, sizes[0]), (ray.direction, &line.d, sizes[1])] {
+        for i in 0..3 {
+            let off = (Big::from(rounded[i]) - &exact.0[i]).abs();
+            let bound = Big::from(u) * Big::from(rounded[i]).abs() + Big::from(48.0 * u * u * size[i]);
+            // And what underflows in a product.
+            let bound = bound + Big::from(f64::from_bits(256));
+            assert!(off.cmp(&bound).is_le(), "{} is off by {}: {}", rounded[i], off.to_f64(), case.hex());
+        }
+    }
+    ray
 }

@@ -72,17 +72,9 @@ const OWN: [Family; 8] = [
         super::exactly_towards(rng, target, Solid::Slab { min, max })
     }),
 ];
-const ALL: [Family; OWN.len() + 10] = {
-    let shared = shared_families!(Kernel::Slab, super::box_::ordinary);
-    let mut all = [OWN[0]; OWN.len() + 10];
-    let mut i = 0;
-    while i < all.len() {
-        all[i] = if i < OWN.len() { OWN[i] } else { shared[i - OWN.len()] };
-        i += 1;
-    }
-    all
-};
-pub const FAMILIES: &[Family] = &ALL;
+pub fn boxes() -> Vec<Family> {
+    [&OWN[..], &shared_families!(Kernel::Slab, super::box_::ordinary)].concat()
+}
 
 pub fn ordinary(rng: &mut Rng, _: usize) -> Case {
     let (min, max) = random(rng);

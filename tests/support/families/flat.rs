@@ -60,17 +60,9 @@ const OWN_PLANE: [Family; 5] = [
         }
     }),
 ];
-const ALL_PLANE: [Family; OWN_PLANE.len() + 10] = {
-    let shared = shared_families!(Kernel::Plane, super::flat::ordinary_plane);
-    let mut all = [OWN_PLANE[0]; OWN_PLANE.len() + 10];
-    let mut i = 0;
-    while i < all.len() {
-        all[i] = if i < OWN_PLANE.len() { OWN_PLANE[i] } else { shared[i - OWN_PLANE.len()] };
-        i += 1;
-    }
-    all
-};
-pub const PLANE: &[Family] = &ALL_PLANE;
+pub fn planes() -> Vec<Family> {
+    [&OWN_PLANE[..], &shared_families!(Kernel::Plane, super::flat::ordinary_plane)].concat()
+}
 
 const OWN_TRIANGLE: [Family; 20] = [
     triangle(7, "met at 1e-3..1e-10 rad", |rng, _| grazing(rng, 1.0)),
@@ -192,17 +184,9 @@ const OWN_TRIANGLE: [Family; 20] = [
         case
     }),
 ];
-const ALL_TRIANGLE: [Family; OWN_TRIANGLE.len() + 10] = {
-    let shared = shared_families!(Kernel::Triangle, super::flat::ordinary_triangle);
-    let mut all = [OWN_TRIANGLE[0]; OWN_TRIANGLE.len() + 10];
-    let mut i = 0;
-    while i < all.len() {
-        all[i] = if i < OWN_TRIANGLE.len() { OWN_TRIANGLE[i] } else { shared[i - OWN_TRIANGLE.len()] };
-        i += 1;
-    }
-    all
-};
-pub const TRIANGLE: &[Family] = &ALL_TRIANGLE;
+pub fn triangles() -> Vec<Family> {
+    [&OWN_TRIANGLE[..], &shared_families!(Kernel::Triangle, super::flat::ordinary_triangle)].concat()
+}
 
 pub fn ordinary_plane(rng: &mut Rng, _: usize) -> Case {
     // The half of the lines that look away misses.

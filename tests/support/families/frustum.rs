@@ -52,17 +52,9 @@ const OWN_CYLINDER: [Family; 10] = [
         f.in_cap_plane(rng, i)
     }),
 ];
-const ALL_CYLINDER: [Family; OWN_CYLINDER.len() + 10] = {
-    let shared = shared_families!(Kernel::Cylinder, super::frustum::ordinary_cylinder);
-    let mut all = [OWN_CYLINDER[0]; OWN_CYLINDER.len() + 10];
-    let mut i = 0;
-    while i < all.len() {
-        all[i] = if i < OWN_CYLINDER.len() { OWN_CYLINDER[i] } else { shared[i - OWN_CYLINDER.len()] };
-        i += 1;
-    }
-    all
-};
-pub const CYLINDER: &[Family] = &ALL_CYLINDER;
+pub fn cylinders() -> Vec<Family> {
+    [&OWN_CYLINDER[..], &shared_families!(Kernel::Cylinder, super::frustum::ordinary_cylinder)].concat()
+}
 
 const OWN_CONE: [Family; 15] = [
     cone(5, "grazed", |rng, _| {
@@ -150,17 +142,9 @@ const OWN_CONE: [Family; 15] = [
         super::towards(rng, target, 5.0, f.solid())
     }),
 ];
-const ALL_CONE: [Family; OWN_CONE.len() + 10] = {
-    let shared = shared_families!(Kernel::Cone, super::frustum::ordinary_cone);
-    let mut all = [OWN_CONE[0]; OWN_CONE.len() + 10];
-    let mut i = 0;
-    while i < all.len() {
-        all[i] = if i < OWN_CONE.len() { OWN_CONE[i] } else { shared[i - OWN_CONE.len()] };
-        i += 1;
-    }
-    all
-};
-pub const CONE: &[Family] = &ALL_CONE;
+pub fn cones() -> Vec<Family> {
+    [&OWN_CONE[..], &shared_families!(Kernel::Cone, super::frustum::ordinary_cone)].concat()
+}
 
 pub fn ordinary_cylinder(rng: &mut Rng, _: usize) -> Case {
     Parts::cylinder(rng).ordinary(rng)

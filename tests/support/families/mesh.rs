@@ -38,10 +38,13 @@ pub const FAMILIES: &[Family] = &[
         let target = m.positions[0].lerp(m.positions[1], rng.pick(&[0.25, 0.5, 0.75]));
         super::exactly_towards(rng, target, m.solid())
     }),
-    family(36, "T-junction whose middle is rounded", |rng, _| {
+    family(36, "T-junction whose middle is rounded", |rng, i| {
         let t = rng.uniform(0.3, 0.7);
         let m = junction(rng, t);
-        let (target, distance) = (m.positions[0].lerp(m.positions[1], rng.uniform(0.0, 1.0)), rng.log(0.5, 1e3));
+        let along = m.positions[0].lerp(m.positions[1], rng.uniform(0.0, 1.0));
+        // At the edge, or from so near the middle that rays tell points of the crack apart.
+        let (target, distance) =
+            if i.is_multiple_of(2) { (along, rng.log(0.5, 1e3)) } else { (m.positions[4], rng.log(1e-4, 1e-2)) };
         super::towards(rng, target, distance, m.solid())
     }),
     family(38, "integer grid, axis-parallel rays", |rng, _| {
@@ -66,6 +69,34 @@ pub const FAMILIES: &[Family] = &[
         let target = DVec3::new(rng.eighths(4).abs(), rng.eighths(4).abs(), 0.0);
         super::exactly_towards(rng, target, m.solid())
     }),
+    family(81, "identical centroids", |rng, _| {
+        let m = soup(40, |_| {
+            let (u, v) = (rng.small(3), rng.small(3));
+            [u, v, -(u + v)]
+        });
+        let target = rng.small(1);
+        super::exactly_towards(rng, target, m.solid())
+    }),
+    family(82, "needles in boxes of aspect 1e9", |rng, i| {
+        let stretch = [DVec3::new(1e9, 1.0, 1.0), DVec3::new(1.0, 1.0, 1e-9), DVec3::ONE][i % 3];
+        let m = soup(40, |_| {
+            let (a, u, v) = (rng.in_cube(3.0), rng.unit(), rng.unit());
+            // Long in space, or by the stretch.
+            [a, a + u, a + if i % 3 == 2 { u * 0.5 + v * 1e-9 } else { v }].map(|p| p * stretch)
+        });
+        let t = m.triangles[rng.below(40) as usize].map(|k| m.positions[k as usize]);
+        let (a, b) = (rng.uniform(0.0, 0.6), rng.uniform(0.0, 0.6));
+        let target = t[0] + (t[1] - t[0]) * a + (t[2] - t[0]) * b;
+        let o = target - rng.unit() * stretch * rng.uniform(1.0, 5.0);
+        Case::new(o, (target - o) * rng.length(), m.solid())
+    }),
+    family(87, "each half of the one before: a deep tree", |rng, _| {
+        let m = soup(60, |k| [DVec3::X, DVec3::Y, DVec3::Z].map(|p| p * 0.5f64.powi(k as i32)));
+        let scale = 0.5f64.powi(rng.integer(0, 62) as i32);
+        let origin = DVec3::new(rng.eighths(2).abs(), rng.eighths(2).abs(), rng.eighths(2).abs()) * scale;
+        let direction = if rng.chance(0.5) { DVec3::splat(rng.sign()) } else { rng.unit() };
+        Case::new(origin, direction, m.solid())
+    }),
     family(53, "origin on a vertex or an edge", |rng, i| {
         let m = ball(rng, DVec3::ZERO);
         let t = m.triangles[rng.below(m.triangles.len() as u64) as usize];
@@ -85,6 +116,12 @@ impl Mesh {
     fn solid(&self) -> Solid {
         Solid::Mesh { positions: self.positions.clone(), triangles: self.triangles.clone() }
     }
+}
+
+/// `n` triangles that share nothing.
+fn soup(n: u32, triangle: impl FnMut(u32) -> [DVec3; 3]) -> Mesh {
+    let positions = (0..n).flat_map(triangle).collect();
+    Mesh { positions, triangles: (0..n).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect() }
 }
 
 /// A closed octahedron, each face split in four: 18 vertices, 32 faces, coordinates of few bits (about the origin).

@@ -22,15 +22,15 @@ pub fn ordinary(kernel: Kernel) -> Family {
 /// Every family of every kernel.
 pub fn all() -> Vec<Family> {
     let mut families: Vec<Family> = [
-        flat::PLANE,
-        flat::TRIANGLE,
-        polygon::FAMILIES,
-        sphere::FAMILIES,
-        frustum::CYLINDER,
-        frustum::CONE,
-        box_::FAMILIES,
-        mesh::FAMILIES,
-        affine::FAMILIES,
+        flat::planes(),
+        flat::triangles(),
+        polygon::polygons(),
+        sphere::spheres(),
+        frustum::cylinders(),
+        frustum::cones(),
+        box_::boxes(),
+        mesh::FAMILIES.to_vec(),
+        affine::FAMILIES.to_vec(),
     ]
     .concat();
     for (kernel, ordinary) in [

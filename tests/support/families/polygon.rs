@@ -54,17 +54,9 @@ const OWN: [Family; 7] = [
         Case { within: Interval::LINE, ..Case::new(o, rng.unit() * rng.length(), Solid::Polygon(contours)) }
     }),
 ];
-const ALL: [Family; OWN.len() + 10] = {
-    let shared = shared_families!(Kernel::Polygon, super::polygon::ordinary);
-    let mut all = [OWN[0]; OWN.len() + 10];
-    let mut i = 0;
-    while i < all.len() {
-        all[i] = if i < OWN.len() { OWN[i] } else { shared[i - OWN.len()] };
-        i += 1;
-    }
-    all
-};
-pub const FAMILIES: &[Family] = &ALL;
+pub fn polygons() -> Vec<Family> {
+    [&OWN[..], &shared_families!(Kernel::Polygon, super::polygon::ordinary)].concat()
+}
 
 pub fn ordinary(rng: &mut Rng, i: usize) -> Case {
     let (contours, [p, x, y]) = exact(rng, i);

@@ -69,17 +69,9 @@ const OWN: [Family; 15] = [
         super::towards(rng, target, 5.0, Solid::Sphere { center, radius: 1.0 })
     }),
 ];
-const ALL: [Family; OWN.len() + 10] = {
-    let shared = shared_families!(Kernel::Sphere, super::sphere::ordinary);
-    let mut all = [OWN[0]; OWN.len() + 10];
-    let mut i = 0;
-    while i < all.len() {
-        all[i] = if i < OWN.len() { OWN[i] } else { shared[i - OWN.len()] };
-        i += 1;
-    }
-    all
-};
-pub const FAMILIES: &[Family] = &ALL;
+pub fn spheres() -> Vec<Family> {
+    [&OWN[..], &shared_families!(Kernel::Sphere, super::sphere::ordinary)].concat()
+}
 
 pub fn ordinary(rng: &mut Rng, _: usize) -> Case {
     let distance = rng.uniform(2.0, 10.0);

@@ -1,0 +1,310 @@
+//! Affine maps to twice the precision: exact inverses, chains as one map, images of rays with what rounding took away.
+//!
+//! docs/numerics.md §8.
+
+use super::bound::U;
+use super::cpu;
+use super::dyadic::Dyadic;
+use super::eft::{Fused, Product, Split, two_sum};
+use super::number::{Number, Vector, cross, dot, vector};
+use super::ratio::Ratio;
+use crate::ray::Ray;
+use glam::{DAffine3, DMat3, DVec3};
+
+/// An affine map whose entries are sums of two floats: a map, or the product of a chain of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Map {
+    leading: DAffine3,
+    low: DAffine3,
+    /// How far the sums may be off an entry of the exact chain: of its matrix, of its translation.
+    errors: [f64; 2],
+}
+
+/// Why a map cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unusable {
+    /// It flattens space.
+    Singular,
+    /// An entry leaves the range of floats.
+    OutOfRange,
+}
+
+/// Rows and translation.
+type Exact = ([Vector<Dyadic>; 3], Vector<Dyadic>);
+
+impl From<DAffine3> for Map {
+    fn from(map: DAffine3) -> Self {
+        let low = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
+        Self { leading: map, low, errors: [0.0; 2] }
+    }
+}
+
+/// The inverse, each entry rounded once: found exactly, so that no determinant under- or overflows. `map` must be finite.
+///
+/// # Errors
+/// If the exact determinant is zero, or an entry of the inverse overflows.
+pub fn inverse(map: &DAffine3) -> Result<DAffine3, Unusable> {
+    Map::from(*map).inverse()
+}
+
+impl Map {
+    /// Each entry rounded once.
+    #[must_use]
+    pub fn leading(&self) -> &DAffine3 {
+        &self.leading
+    }
+
+    /// This map's inverse, each entry rounded once.
+    ///
+    /// # Errors
+    /// If the determinant is zero, or an entry of the inverse overflows.
+    pub fn inverse(&self) -> Result<DAffine3, Unusable> {
+        let (rows, translation) = self.exact();
+        let columns: [Vector<Dyadic>; 3] = [0, 1, 2].map(|j| [0, 1, 2].map(|i: usize| rows[i][j].clone()));
+        let [x, y, z] = &columns;
+        let cofactors = [cross(y, z), cross(z, x), cross(x, y)];
+        let determinant = dot(x, &cofactors[0]);
+        if determinant.is_zero() {
+            return Err(Unusable::Singular);
+        }
+        let over = |numerator: Dyadic| {
+            let ratio = Ratio { numerator, denominator: determinant.clone() };
+            match ratio.lambda(0.0) {
+                Some((value, error)) if error.is_finite() => Ok(value),
+                _ => Err(Unusable::OutOfRange),
+            }
+        };
+        let row = |r: &Vector<Dyadic>| Ok(DVec3::new(over(r[0].clone())?, over(r[1].clone())?, over(r[2].clone())?));
+        let shift = |r: &Vector<Dyadic>| over(dot(r, &translation).negated());
+        let [a, b, c] = &cofactors;
+        Ok(DAffine3 {
+            matrix3: DMat3::from_cols(row(a)?, row(b)?, row(c)?).transpose(),
+            translation: DVec3::new(shift(a)?, shift(b)?, shift(c)?),
+        })
+    }
+
+    /// First `first`, then this map: multiplied exactly, rounded to two floats an entry.
+    ///
+    /// # Errors
+    /// If an entry overflows.
+    pub fn after(&self, first: &DAffine3) -> Result<Self, Unusable> {
+        let (rows, translation) = self.exact();
+        let columns = [first.matrix3.x_axis, first.matrix3.y_axis, first.matrix3.z_axis].map(vector::<Dyadic>);
+        let shift = vector::<Dyadic>(first.translation);
+        let mut product = Self::from(DAffine3::ZERO);
+        for i in 0..3 {
+            for (j, column) in columns.iter().enumerate() {
+                let (hi, lo) = dot(&rows[i], column).rounded().0.to_pair();
+                product.leading.matrix3.col_mut(j)[i] = hi;
+                product.low.matrix3.col_mut(j)[i] = lo;
+            }
+            let (hi, lo) = dot(&rows[i], &shift).plus(&translation[i]).rounded().0.to_pair();
+            product.leading.translation[i] = hi;
+            product.low.translation[i] = lo;
+        }
+        if !product.leading.is_finite() {
+            return Err(Unusable::OutOfRange);
+        }
+        // Two floats hold a number to 2⁻¹⁰⁴ of itself, or to a few of the smallest; what this map did not know is multiplied.
+        let rounding = |largest: f64| 4.0 * U * U * largest + f64::from_bits(4);
+        let largest = |m: &DMat3| m.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+        let [matrix, shift] = self.errors;
+        let translation = product.leading.translation.abs().max_element();
+        product.errors = [
+            3.1 * matrix * largest(&first.matrix3) + rounding(largest(&product.leading.matrix3)),
+            1.1 * matrix * taxicab(first.translation) + 1.1 * shift + rounding(translation),
+        ];
+        Ok(product)
+    }
+
+    /// The image of `ray`.
+    #[must_use]
+    pub fn image(&self, ray: &Ray) -> Image {
+        let image = cpu::dispatch(
+            #[inline(always)]
+            || self.image_with::<Fused>(ray),
+            #[inline(always)]
+            || self.image_with::<Split>(ray),
+        );
+        // Where the terms cancel by more than a far-off place explains, two floats may not hold enough of their sum.
+        let size = |v: DVec3| v.abs().max_element();
+        let (o, d) = (size(image.ray.origin), size(image.ray.direction));
+        let shifts_lambda = image.origin_error * size(ray.direction) > ENOUGH * ENOUGH * U * size(ray.origin) * d;
+        let poor = image.direction_error > ENOUGH * U * d || image.origin_error > ENOUGH * U * o && shifts_lambda;
+        if poor && ray.is_valid() { self.exact_image(ray).unwrap_or(image) } else { image }
+    }
+
+    #[inline(always)]
+    fn image_with<P: Product>(&self, ray: &Ray) -> Image {
+        let row = |i: usize, v: DVec3, t: [f64; 2]| {
+            let (m, low) = (&self.leading.matrix3, &self.low.matrix3);
+            let low = (low.x_axis[i] * v.x + low.y_axis[i] * v.y) + (low.z_axis[i] * v.z + t[1]);
+            sum::<P>([m.x_axis[i], m.y_axis[i], m.z_axis[i]], v, t[0], low)
+        };
+        let (t, t_low) = (self.leading.translation, self.low.translation);
+        Image::new(
+            [0, 1, 2].map(|i| row(i, ray.origin, [t[i], t_low[i]])),
+            [0, 1, 2].map(|i| row(i, ray.direction, [0.0; 2])),
+            self.unknown(ray),
+        )
+    }
+
+    /// By how much not knowing the chain's entries moves origin and direction (|·|₁).
+    #[inline(always)]
+    fn unknown(&self, ray: &Ray) -> [f64; 2] {
+        let [matrix, shift] = self.errors;
+        if matrix == 0.0 {
+            return [0.0; 2];
+        }
+        [3.1 * (matrix * taxicab(ray.origin) + shift), 3.1 * matrix * taxicab(ray.direction)]
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn exact_image(&self, ray: &Ray) -> Option<Image> {
+        let (rows, translation) = self.exact();
+        let (o, d) = (vector::<Dyadic>(ray.origin), vector::<Dyadic>(ray.direction));
+        let rounded = |x: Dyadic| {
+            let (hi, lo) = x.rounded().0.to_pair();
+            (hi, lo, 4.0 * U * U * hi.abs())
+        };
+        let image = Image::new(
+            [0, 1, 2].map(|i| rounded(dot(&rows[i], &o).plus(&translation[i]))),
+            [0, 1, 2].map(|i| rounded(dot(&rows[i], &d))),
+            self.unknown(ray),
+        );
+        (image.ray.origin.is_finite() && image.ray.direction.is_finite()).then_some(image)
+    }
+
+    fn exact(&self) -> Exact {
+        let entry = |hi: f64, lo: f64| if lo == 0.0 { hi.into() } else { Dyadic::from(hi).plus(&lo.into()) };
+        let both = |hi: DVec3, lo: DVec3| [0, 1, 2].map(|j| entry(hi[j], lo[j]));
+        let row = |i: usize| both(self.leading.matrix3.row(i), self.low.matrix3.row(i));
+        ([row(0), row(1), row(2)], both(self.leading.translation, self.low.translation))
+    }
+}
+
+/// How much better than the last place of its components a ray's image is known.
+const ENOUGH: f64 = 1.0 / (1u64 << 20) as f64;
+
+/// A ray's image: rounded, what rounding took away, and bounds (|·|₁) on what even that leaves out.
+#[derive(Clone, Copy, Debug)]
+pub struct Image {
+    /// Each component rounded once.
+    pub ray: Ray,
+    /// What is missing from the origin.
+    pub origin_low: DVec3,
+    /// What is missing from the direction.
+    pub direction_low: DVec3,
+    /// A bound on what is missing beyond that from the origin.
+    pub origin_error: f64,
+    /// A bound on what is missing beyond that from the direction.
+    pub direction_error: f64,
+}
+
+impl Image {
+    #[inline(always)]
+    fn new(o: [(f64, f64, f64); 3], d: [(f64, f64, f64); 3], unknown: [f64; 2]) -> Self {
+        // Products and their errors may have underflowed.
+        let left_out = |v: &[(f64, f64, f64); 3]| (v[0].2 + v[1].2 + v[2].2) + 64.0 * f64::from_bits(1);
+        Self {
+            ray: Ray { origin: DVec3::new(o[0].0, o[1].0, o[2].0), direction: DVec3::new(d[0].0, d[1].0, d[2].0) },
+            origin_low: DVec3::new(o[0].1, o[1].1, o[2].1),
+            direction_low: DVec3::new(d[0].1, d[1].1, d[2].1),
+            origin_error: left_out(&o) + unknown[0],
+            direction_error: left_out(&d) + unknown[1],
+        }
+    }
+}
+
+/// r·v + t + `low` in double-double, and a bound on its error: the low part is a sum of seven terms in six additions, and
+/// `low` of four products or less, rounded seven times.
+#[inline(always)]
+pub(crate) fn sum<P: Product>(r: [f64; 3], v: DVec3, t: f64, low: f64) -> (f64, f64, f64) {
+    let (x, x_lo) = P::two_product(r[0], v.x);
+    let (y, y_lo) = P::two_product(r[1], v.y);
+    let (z, z_lo) = P::two_product(r[2], v.z);
+    let (xy, e) = two_sum(x, y);
+    let (zt, f) = two_sum(z, t);
+    let (s, g) = two_sum(xy, zt);
+    let (hi, lo) = two_sum(s, (((e + f) + g) + ((x_lo + y_lo) + z_lo)) + low);
+    // Each term is at most u of the sum of the products' absolute values, or of partial sums below that.
+    let size = (x.abs() + y.abs()) + (z.abs() + t.abs());
+    (hi, lo, 40.0 * U * U * size)
+}
+
+/// |v|₁ ≥ |v|.
+#[inline(always)]
+pub(crate) fn taxicab(v: DVec3) -> f64 {
+    v.abs().element_sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn number() -> impl Strategy<Value = f64> {
+        (-1.0..1.0f64, -60..60i32).prop_map(|(m, e)| m * 2f64.powi(e))
+    }
+
+    fn map(x: &[f64]) -> DAffine3 {
+        DAffine3::from_cols_slice(x)
+    }
+
+    fn ray(x: &[f64]) -> Ray {
+        Ray::new([x[0], x[1], x[2]], [x[3], x[4], x[5]])
+    }
+
+    proptest! {
+        #[test]
+        fn both_products_answer_with_the_same_bits(x in prop::collection::vec(number(), 30)) {
+            let Ok(chain) = Map::from(map(&x[..12])).after(&map(&x[12..24])) else { return Ok(()) };
+            let ray = ray(&x[24..]);
+            let (split, fused) = (chain.image_with::<Split>(&ray), chain.image_with::<Fused>(&ray));
+            prop_assert_eq!(format!("{split:?}"), format!("{fused:?}"));
+        }
+
+        #[test]
+        fn the_exact_image_is_inside(x in prop::collection::vec(number(), 30)) {
+            let (first, second) = (map(&x[..12]), map(&x[12..24]));
+            let ray = ray(&x[24..]);
+            let chain = Map::from(second).after(&first).unwrap();
+            let (near, far) = (Map::from(first).exact(), Map::from(second).exact());
+            let through = |m: &Exact, v: &Vector<Dyadic>, moved: bool| [0, 1, 2].map(|i: usize| {
+                let turned = dot(&m.0[i], v);
+                if moved { turned.plus(&m.1[i]) } else { turned }
+            });
+            for image in [chain.image_with::<Split>(&ray), chain.exact_image(&ray).unwrap()] {
+                let parts = [
+                    (true, ray.origin, image.ray.origin, image.origin_low, image.origin_error),
+                    (false, ray.direction, image.ray.direction, image.direction_low, image.direction_error),
+                ];
+                for (moved, v, hi, lo, error) in parts {
+                    let exact = through(&far, &through(&near, &vector(v), moved), moved);
+                    for i in 0..3 {
+                        let off = exact[i].minus(&hi[i].into()).minus(&lo[i].into()).magnitude();
+                        prop_assert!(off.minus(&error.into()).sign() != Some(std::cmp::Ordering::Greater));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn inverses_have_no_range_of_their_own() {
+        for k in [-300, -120, 0, 120, 300] {
+            let s = 2f64.powi(k);
+            let map =
+                DAffine3 { matrix3: DMat3::from_diagonal(DVec3::new(s, -s, 2.0 * s)), translation: DVec3::splat(s) };
+            let inverse = inverse(&map).unwrap();
+            assert_eq!(inverse.matrix3, DMat3::from_diagonal(DVec3::new(1.0, -1.0, 0.5) / s));
+            assert_eq!(inverse.translation, DVec3::new(-1.0, 1.0, -0.5));
+        }
+        assert_eq!(inverse(&DAffine3::from_mat3(DMat3::ZERO)), Err(Unusable::Singular));
+        let tiny = DAffine3::from_scale(DVec3::splat(1e-310));
+        assert_eq!(inverse(&tiny), Err(Unusable::OutOfRange));
+        let huge = DAffine3::from_scale(DVec3::splat(1e200));
+        assert_eq!(Map::from(huge).after(&huge), Err(Unusable::OutOfRange));
+    }
+}
