@@ -93,7 +93,7 @@ fn rows(contender: &Contender, kernel: Kernel, ordinary: usize, hard: usize) -> 
                     let mut rows = rows.lock().unwrap();
                     rows[*k].merge(row);
                     if i % 250 == 249 {
-                        eprintln!("{} so far: {}", kernel.name(), counts(&rows));
+                        eprintln!("{} so far: {}", kernel.name(), counts(rows.iter()));
                     }
                 }
             });

@@ -313,12 +313,12 @@ fn everything(shape: impl Shape) -> String {
 #[test]
 fn pointers_forward_every_method() {
     let probe = || Probe(DAffine3::IDENTITY.into());
-    let value = everything(probe());
-    assert_eq!(everything(&probe()), value);
+    let (borrowed, value) = (probe(), everything(probe()));
+    assert_eq!(everything(&borrowed), value);
     assert_eq!(everything(Box::new(probe())), value);
     assert_eq!(everything(Arc::new(probe())), value);
     assert_eq!(everything(Box::new(probe()) as Box<dyn Shape>), value);
     assert_eq!(everything(Arc::new(probe()) as Arc<dyn Shape>), value);
-    assert_eq!(everything(&probe() as &dyn Shape), value);
+    assert_eq!(everything(&borrowed as &dyn Shape), value);
     assert_eq!(everything(Arc::new(Box::new(probe()) as Box<dyn Shape>)), value);
 }

@@ -231,7 +231,11 @@ fn wall_normals_are_within_their_bound_of_the_exact_ones_next_to_the_apex_too() 
             let bound = shape.normal_error(&case.ray, &hit) + turned.min(2f64.powi(-39));
             let off = (n - exact).length();
             assert!(off <= bound + 4.0 * f64::EPSILON, "{}: {off:e} > {bound:e}: {}", family.name, case.hex());
-            (worst, furthest) = (worst.max(off / bound), furthest.max(off));
+            worst = worst.max(off / bound);
+            // A radial part among the subnormals has no digits to point with; the bound says so.
+            if !case.ray.origin.to_array().iter().any(|x| x.is_subnormal()) {
+                furthest = furthest.max(off);
+            }
             of_family += 1;
         }
         walls += of_family;
