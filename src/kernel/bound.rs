@@ -21,9 +21,18 @@ pub const UNDERFLOW: f64 = f64::from_bits((1023 - 1000) << 52); // 2⁻¹⁰⁰�
 /// components; the last one covers the bound's own arithmetic.
 pub const TRIANGLE_SIDES: f64 = 50.0 * U;
 
-/// Triangle, docs/numerics.md §4: with the residual r, the terms' size S and the condition κ, one refinement step leaves λ
-/// off by (κ/|d|∞)·u·(|r|∞(first + second·κ) + third·uS), beside its last rounding.
-pub const TRIANGLE_STEP: [f64; 3] = [87.0, 355.0, 150.0];
+/// Triangle, docs/numerics.md §4: the fast path's λ, beyond its last rounding, is off by this times
+/// (|e₁||e₂|/|D|)·(|s| + |λ||d|), in largest components, as long as that is below 3u|λ|. Far more than it need be: the
+/// double-doubles' errors are of order u², and so small a constant does for κ up to 10⁶.
+pub const TRIANGLE_LAMBDA: f64 = U / (1 << 20) as f64;
+
+/// Triangle, docs/numerics.md §4: in double-double each edge function is off by this times |d|·(|e₁||e₂| + |s|(|e₁|+|e₂|)),
+/// and λ, beyond its last rounding, by this times (|e₁||e₂|/|D|)·(|s| + |λ||d|).
+pub const TRIANGLE_CLOSE: f64 = 600.0 * U * U;
+
+/// Plane, docs/numerics.md §3: what does instead of [`PLANE_QUOTIENT`]·κ as long as λ comes out known to ¼u|λ|, which
+/// leaves κ below 2¹⁸.
+pub const PLANE_LAMBDA: f64 = U / (1 << 20) as f64;
 
 /// Plane, docs/numerics.md §3: λ beyond its last rounding is off by this times u²κ(P_N/|D| + |λ|κ), where P are the sums of
 /// the products' absolute values and κ = P_D/|D|.
@@ -35,6 +44,3 @@ pub const POLYGON_COORDINATE: f64 = 7.0 * U;
 /// Where splitting a factor could overflow; fast paths stay below, so that both kinds of
 /// [`Product`](super::eft::Product) give the same bits.
 pub const LARGE: f64 = f64::from_bits((1023 + 900) << 52);
-
-/// Above this, what underflows in a bound of λ is less than the last place of the bound.
-pub const SMALL: f64 = f64::from_bits((1023 - 900) << 52);

@@ -1,5 +1,6 @@
 //! Which instructions this CPU has, asked once; code is compiled for each and chosen at run time.
 
+use super::lanes::Lanes;
 use fearless_simd::Level;
 
 /// Runs `fused` compiled for a CPU with fused multiply-add if this one has it, else `portable`.
@@ -27,4 +28,52 @@ pub fn dispatch<R>(fused: impl FnOnce() -> R, portable: impl FnOnce() -> R) -> R
         let _ = fused;
         portable()
     }
+}
+
+/// [`dispatch`] to code that computes with [`Lanes`]: `fused` is given the proof that they are there.
+#[inline(always)]
+pub fn dispatch_lanes<R>(fused: impl FnOnce(<FusedLanes as Lanes>::Cpu) -> R, portable: impl FnOnce() -> R) -> R {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    {
+        use fearless_simd::Simd;
+        match Level::new().as_avx2() {
+            Some(avx2) => avx2.vectorize(
+                #[inline(always)]
+                || fused(avx2),
+            ),
+            None => portable(),
+        }
+    }
+    #[cfg(target_arch = "aarch64")]
+    {
+        let _ = portable;
+        fused(fused_lanes())
+    }
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
+    {
+        let _ = fused;
+        portable()
+    }
+}
+
+/// Vectors of a CPU with fused multiply-add.
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+pub type FusedLanes = fearless_simd::f64x4<fearless_simd::Avx2>;
+/// Vectors of a CPU with fused multiply-add.
+#[cfg(target_arch = "aarch64")]
+pub type FusedLanes = fearless_simd::f64x4<fearless_simd::Neon>;
+/// Vectors of a CPU with fused multiply-add: none is known here.
+#[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
+pub type FusedLanes = super::lanes::Plain;
+
+/// The proof that there is fused multiply-add.
+///
+/// # Panics
+/// If there is none: a caller's bug.
+#[inline(always)]
+pub(super) fn fused_lanes() -> <FusedLanes as Lanes>::Cpu {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    return Level::new().as_avx2().expect("a CPU with AVX2");
+    #[cfg(target_arch = "aarch64")]
+    return Level::new().as_neon().expect("a CPU with NEON");
 }

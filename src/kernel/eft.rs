@@ -3,13 +3,20 @@
 //! Sources: Knuth (two-sum), Dekker 1971 and Veltkamp (two-product without FMA), Ogita, Rump, Oishi 2005.
 //! Exact as long as nothing over- or underflows: docs/numerics.md §1.
 
+use super::cpu::{FusedLanes, fused_lanes};
+use super::lanes::{Lanes, Plain};
 use glam::DVec3;
 use std::fmt::Debug;
+use std::ops::{Add, Sub};
+
+/// What sums and differences are formed in: one float or [`Lanes`] of them.
+pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> {}
+impl<T: Copy + Add<Output = T> + Sub<Output = T>> Real for T {}
 
 /// (s, e): s = fl(a + b) and s + e = a + b exactly.
 #[inline(always)]
 #[must_use]
-pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub fn two_sum<T: Real>(a: T, b: T) -> (T, T) {
     let s = a + b;
     let bb = s - a;
     (s, (a - (s - bb)) + (b - bb))
@@ -18,7 +25,7 @@ pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
 /// (d, e): d = fl(a − b) and d + e = a − b exactly.
 #[inline(always)]
 #[must_use]
-pub fn two_diff(a: f64, b: f64) -> (f64, f64) {
+pub fn two_diff<T: Real>(a: T, b: T) -> (T, T) {
     let d = a - b;
     let bb = d - a;
     (d, (a - (d - bb)) - (b + bb))
@@ -27,7 +34,7 @@ pub fn two_diff(a: f64, b: f64) -> (f64, f64) {
 /// [`two_sum`] for |a| ≥ |b| or a = 0.
 #[inline(always)]
 #[must_use]
-pub fn quick_two_sum(a: f64, b: f64) -> (f64, f64) {
+pub fn quick_two_sum<T: Real>(a: T, b: T) -> (T, T) {
     let s = a + b;
     (s, b - (s - a))
 }
@@ -35,8 +42,12 @@ pub fn quick_two_sum(a: f64, b: f64) -> (f64, f64) {
 /// How a product's rounding error is found. Both ways give the same bits, so a kernel generic over this trait answers
 /// alike on every CPU; plain expressions never fuse.
 pub trait Product: Copy + Debug {
+    /// Vectors with products of this kind.
+    type Lanes: Lanes;
     /// (p, e): p = fl(a·b) and p + e = a·b exactly.
     fn two_product(a: f64, b: f64) -> (f64, f64);
+    /// What [`Lanes`] need to know of the CPU: it is asked whether it has the instructions.
+    fn cpu() -> <Self::Lanes as Lanes>::Cpu;
 }
 
 /// By fused multiply-add: two instructions, but only inside code compiled for a CPU that has it
@@ -49,6 +60,13 @@ pub struct Fused;
 pub struct Split;
 
 impl Product for Fused {
+    type Lanes = FusedLanes;
+
+    #[inline(always)]
+    fn cpu() -> <FusedLanes as Lanes>::Cpu {
+        fused_lanes()
+    }
+
     #[inline(always)]
     fn two_product(a: f64, b: f64) -> (f64, f64) {
         let p = a * b;
@@ -57,6 +75,11 @@ impl Product for Fused {
 }
 
 impl Product for Split {
+    type Lanes = Plain;
+
+    #[inline(always)]
+    fn cpu() {}
+
     #[inline(always)]
     fn two_product(a: f64, b: f64) -> (f64, f64) {
         let p = a * b;

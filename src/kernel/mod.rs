@@ -8,6 +8,7 @@ pub mod eft;
 mod fixed;
 pub mod float;
 pub mod frustum;
+pub mod lanes;
 pub mod map;
 pub mod number;
 mod pair;

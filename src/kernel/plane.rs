@@ -3,10 +3,11 @@
 //! Both dot products are compensated (Ogita, Rump, Oishi 2005) with the rounding errors of p−o; one remainder step makes
 //! the quotient of the double-doubles. docs/numerics.md §3.
 
-use super::bound::{LARGE, PLANE_QUOTIENT, SMALL, U, UNDERFLOW};
+use super::bound::{PLANE_LAMBDA, PLANE_QUOTIENT, U, UNDERFLOW};
 use super::cpu;
 use super::eft::{Fused, Product, Split, two_diff, two_sum};
-use super::float::{exponent_of, ldexp};
+use super::float::{exponent_of, ldexp, power};
+use super::lanes::{Double, Lanes};
 use super::number::{self, Number, difference, dot, vector};
 use super::ratio::{self, Ratio};
 use crate::{Hit, Interval, Ray};
@@ -20,11 +21,11 @@ use std::cmp::Ordering;
 #[inline]
 #[must_use]
 pub fn intersect(ray: &Ray, point: DVec3, normal: DVec3, within: Interval) -> Option<Hit> {
-    cpu::dispatch(
+    cpu::dispatch_lanes(
         #[inline(always)]
-        || intersect_with::<Fused>(ray, point, normal, within),
+        |cpu| fast::<Fused>(cpu, ray, &point, &normal, within),
         #[inline(always)]
-        || intersect_with::<Split>(ray, point, normal, within),
+        || fast::<Split>((), ray, &point, &normal, within),
     )
 }
 
@@ -33,10 +34,21 @@ pub fn intersect(ray: &Ray, point: DVec3, normal: DVec3, within: Interval) -> Op
 #[inline(always)]
 #[must_use]
 pub fn intersect_with<P: Product>(ray: &Ray, point: DVec3, normal: DVec3, within: Interval) -> Option<Hit> {
-    match quotient::<P>(ray, point, [normal, DVec3::ZERO], within) {
+    fast::<P>(P::cpu(), ray, &point, &normal, within)
+}
+
+#[inline(always)]
+fn fast<P: Product>(
+    cpu: <P::Lanes as Lanes>::Cpu,
+    ray: &Ray,
+    point: &DVec3,
+    normal: &DVec3,
+    within: Interval,
+) -> Option<Hit> {
+    match quotient::<P, false>(cpu, ray, point, normal, None, within) {
         Quotient::Outside => None,
         Quotient::Inside { lambda, error } => Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 }),
-        Quotient::Uncertain => refine(ray, point, normal, within),
+        Quotient::Uncertain => refine(ray, point, normal, within.min, within.max),
     }
 }
 
@@ -51,35 +63,80 @@ pub(super) enum Quotient {
     Uncertain,
 }
 
-/// n·(p−o)/n·d, the normal a double-double that is off by at most 2u² of each component.
+/// λ = `q` + `correction` to within `beyond_rounding`, before it is rounded.
+#[derive(Clone, Copy, Debug)]
+struct Solved {
+    q: f64,
+    correction: f64,
+    beyond_rounding: f64,
+}
+
+/// n·(p−o)/n·d, the normal a float vector, or a double-double that is off by at most 2u² of each component. `CLOSE` has the
+/// sharper bound, which costs a little more and knows planes that are nearly grazed, and origins next to them.
 #[inline(always)]
-pub(super) fn quotient<P: Product>(ray: &Ray, point: DVec3, [n, n_lo]: [DVec3; 2], within: Interval) -> Quotient {
-    let (o, d) = (ray.origin, ray.direction);
-    let ((sx, tx), (sy, ty), (sz, tz)) = (two_diff(point.x, o.x), two_diff(point.y, o.y), two_diff(point.z, o.z));
-    let (s, s_lo) = (DVec3::new(sx, sy, sz), DVec3::new(tx, ty, tz));
-    let (num, num_lo, num_size) = dot2::<P>(n, s, n.dot(s_lo) + n_lo.dot(s));
-    let (den, den_lo, den_size) = dot2::<P>(n, d, n_lo.dot(d));
+fn solve<P: Product, const CLOSE: bool>(
+    cpu: <P::Lanes as Lanes>::Cpu,
+    ray: &Ray,
+    point: &DVec3,
+    n: &DVec3,
+    n_lo: Option<&DVec3>,
+) -> Option<Solved> {
+    let lanes = |v: &DVec3| P::Lanes::of(cpu, *v);
+    let (d, s) = (lanes(&ray.direction), Double::difference(lanes(point), lanes(&ray.origin)));
+    let (nd, ns) = match n_lo {
+        None => (Double::product(lanes(n), d), s.times_float(lanes(n))),
+        Some(n_lo) => {
+            let n = Double { hi: lanes(n), lo: lanes(n_lo) };
+            (n.times_float(d), n.times(s))
+        }
+    };
+    // The denominator and the numerator side by side.
+    let [x, y, z] = Lanes::columns([nd.hi, ns.hi, nd.hi, ns.hi]);
+    let (xy, rounding) = two_sum(x, y);
+    let (sums, more_rounding) = two_sum(xy, z);
+    let [den, num, ..] = sums.to_array();
+    let [den_size, num_size, ..] = ((x.abs() + y.abs()) + z.abs()).to_array();
     let inverse = 1.0 / den;
     let q = num * inverse;
+    let (over, size) = (inverse.abs(), num_size + q.abs() * den_size);
+
+    // Proved before it is computed.
+    let (beyond_rounding, known) = if CLOSE {
+        let kappa = den_size * over;
+        let beyond_rounding = PLANE_QUOTIENT * kappa * (over * size);
+        let [md, ms] = [ray.direction, *point - ray.origin].map(|v| v.abs().max_element());
+        let tiny = beyond_rounding * md < FLOOR * ms;
+        (beyond_rounding, ((beyond_rounding < 0.25 * U * q.abs()) | tiny) & (kappa < 1.0 / (64.0 * U)))
+    } else {
+        let beyond_rounding = PLANE_LAMBDA * (over * size);
+        (beyond_rounding, beyond_rounding < 0.25 * U * q.abs())
+    };
+    // Above these nothing that is lost by underflow counts.
+    if !known || !((den.abs() > PRESENT) & (q.abs() > PRESENT)) {
+        return None;
+    }
+    let [lx, ly, lz] = Lanes::columns([nd.lo, ns.lo, nd.lo, ns.lo]);
+    let [den_lo, num_lo, ..] = ((rounding + more_rounding) + ((lx + ly) + lz)).to_array();
     let (t, t_lo) = P::two_product(q, den);
     let remainder = ((num - t) - t_lo) + (num_lo - q * den_lo);
-    let lambda = q + remainder * inverse;
+    Some(Solved { q, correction: remainder * inverse, beyond_rounding })
+}
 
-    let kappa = den_size * inverse.abs();
-    let vanished = UNDERFLOW * inverse.abs();
-    let sizes = n.abs().element_sum() + d.abs().element_sum() + s.abs().element_sum();
-    let beyond_rounding = PLANE_QUOTIENT * (kappa * (num_size * inverse.abs() + q.abs() * kappa))
-        + vanished * (1.0 + q.abs()) * (1.0 + sizes);
-    let error = (U * lambda.abs() + beyond_rounding) * (1.0 + 8.0 * U);
-    // A NaN anywhere makes one of these false.
-    let usable = (kappa < 1.0 / (64.0 * U))
-        & (vanished < 1.0)
-        & (sizes + den.abs() + q.abs() < LARGE)
-        & (lambda.abs() > SMALL)
-        & ((beyond_rounding < 0.5 * U * lambda.abs()) || (beyond_rounding * largest(d) < FLOOR * largest(s)));
-    if !usable {
+/// λ against the interval.
+#[inline(always)]
+pub(super) fn quotient<P: Product, const CLOSE: bool>(
+    cpu: <P::Lanes as Lanes>::Cpu,
+    ray: &Ray,
+    point: &DVec3,
+    n: &DVec3,
+    n_lo: Option<&DVec3>,
+    within: Interval,
+) -> Quotient {
+    let Some(Solved { q, correction, beyond_rounding }) = solve::<P, CLOSE>(cpu, ray, point, n, n_lo) else {
         return Quotient::Uncertain;
-    }
+    };
+    let lambda = q + correction;
+    let error = (U * q.abs() + beyond_rounding) * (1.0 + 8.0 * U);
     if (lambda - error > within.min) & (lambda + error < within.max) {
         return Quotient::Inside { lambda, error };
     }
@@ -89,12 +146,27 @@ pub(super) fn quotient<P: Product>(ray: &Ray, point: DVec3, [n, n_lo]: [DVec3; 2
     Quotient::Uncertain
 }
 
+/// [`quotient`] with the sharper bound.
+pub(super) fn quotient_closely(
+    ray: &Ray,
+    point: &DVec3,
+    n: &DVec3,
+    n_lo: Option<&DVec3>,
+    within: Interval,
+) -> Quotient {
+    cpu::dispatch_lanes(
+        #[inline(always)]
+        |cpu| quotient::<Fused, true>(cpu, ray, point, n, n_lo, within),
+        #[inline(always)]
+        || quotient::<Split, true>((), ray, point, n, n_lo, within),
+    )
+}
+
 /// λ need not be better known than to ½u·2⁻⁴⁴ of the distance to `point` over the direction's length.
 const FLOOR: f64 = 0.5 * U / (1u64 << 44) as f64;
 
-fn largest(v: DVec3) -> f64 {
-    v.abs().max_element()
-}
+/// Denominators and quotients above this, and with them numerators, lose nothing that counts by underflow.
+const PRESENT: f64 = power(-450);
 
 /// a·b + low in double-double, and Σ|aᵢbᵢ|; |low| ≤ 2u·Σ|aᵢbᵢ|.
 #[inline(always)]
@@ -112,9 +184,13 @@ fn ratio<N: Number>(ray: &Ray, point: DVec3, normal: DVec3) -> Ratio<N> {
     Ratio { numerator: dot(&n, &difference(point, ray.origin)), denominator: dot(&n, &vector(ray.direction)) }
 }
 
+/// By references and scalars, so that the caller's vectors stay in registers.
 #[cold]
 #[inline(never)]
-fn refine(ray: &Ray, point: DVec3, normal: DVec3, within: Interval) -> Option<Hit> {
+fn refine(ray: &Ray, point: &DVec3, normal: &DVec3, min: f64, max: f64) -> Option<Hit> {
+    #[cfg(test)]
+    tests::COLD.with(|n| n.set(n.get() + 1));
+    let within = Interval { min, max };
     if !ray.is_valid() || within.is_empty() || !point.is_finite() || !normal.is_finite() {
         return None;
     }
@@ -122,9 +198,19 @@ fn refine(ray: &Ray, point: DVec3, normal: DVec3, within: Interval) -> Option<Hi
     if (0..3).all(|i| normal[i] == 0.0 || ray.direction[i] == 0.0) {
         return None;
     }
-    let (lambda, error) =
-        ratio::refine(|| ratio(ray, point, normal), || ratio(ray, point, normal), within, ratio::floor(ray, point))?;
-    Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 })
+    match quotient_closely(ray, point, normal, None, within) {
+        Quotient::Outside => None,
+        Quotient::Inside { lambda, error } => Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 }),
+        Quotient::Uncertain => {
+            let (lambda, error) = ratio::refine(
+                || ratio(ray, *point, *normal),
+                || ratio(ray, *point, *normal),
+                within,
+                ratio::floor(ray, *point),
+            )?;
+            Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 })
+        }
+    }
 }
 
 /// λ to about a hundred bits, as an unevaluated sum of two floats; zero where the ray lies along the plane.
@@ -159,4 +245,59 @@ pub fn project(point: DVec3, [n, n_lo]: [DVec3; 2], x: DVec3) -> (DVec3, f64) {
     let off = (34.0 * U * U * size + 8.0 * U * h.abs() + UNDERFLOW) / length;
     let rounding = U * n.abs().dot(moved.abs()) / length;
     (moved, (off + rounding) * (1.0 + 16.0 * U))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::search::{Rational, climb, dot3, each, exact, minus};
+    use super::*;
+    use std::cell::Cell;
+
+    thread_local! {
+        /// How often the fast path was left.
+        pub(super) static COLD: Cell<usize> = const { Cell::new(0) };
+    }
+
+    /// Origin, direction, point, normal: from steep to grazing by x₁₂, from far to next to the plane by x₁₃.
+    fn setting(x: &[f64]) -> (Ray, DVec3, DVec3) {
+        let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
+        let (point, normal) = (v(0), v(3));
+        let across = normal.cross(v(6)).normalize_or(DVec3::X);
+        let direction = across + normal * x[12].powi(9);
+        let origin = point + v(9).cross(normal) + normal * 2f64.powf(20.0 * x[13]);
+        (Ray { origin, direction }, point, normal)
+    }
+
+    /// |error of λ before its rounding|/bound, for the answers that are given.
+    fn off<const CLOSE: bool>(x: &[f64]) -> Option<f64> {
+        let (ray, point, normal) = setting(x);
+        let Solved { q, correction, beyond_rounding } = solve::<Split, CLOSE>((), &ray, &point, &normal, None)?;
+        let n = exact(normal);
+        let lambda = dot3(&n, &minus(point, ray.origin)) / dot3(&n, &exact(ray.direction));
+        let [q, correction] = [q, correction].map(|x| Rational::try_from(x).unwrap());
+        Some((lambda - q - correction).to_f64().value().abs() / beyond_rounding)
+    }
+
+    #[test]
+    fn no_input_reaches_the_bounds() {
+        // The first constant is as large as λ's accuracy allows.
+        let worst = climb("plane: λ", 14, off::<false>);
+        assert!(worst < 1.0);
+        let worst = climb("plane: λ, closely", 14, off::<true>);
+        assert!((0.003..1.0).contains(&worst));
+    }
+
+    #[test]
+    fn ordinary_rays_hardly_ever_need_the_cold_path() {
+        let (mut cases, mut hits) = (0, 0);
+        each(400_000, 12, |x| {
+            let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
+            let ray = Ray { origin: 5.0 * v(0), direction: v(3) };
+            cases += 1;
+            hits += usize::from(intersect(&ray, v(6), v(9), Interval::FORWARD).is_some());
+        });
+        let cold = COLD.get();
+        println!("plane: {cold} of {cases} ordinary rays, {hits} hits");
+        assert!(cold * 10_000 < cases && hits * 3 > cases);
+    }
 }

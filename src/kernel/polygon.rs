@@ -10,7 +10,7 @@ use super::cpu;
 use super::dyadic::Dyadic;
 use super::eft::{Fused, Product, Split};
 use super::number::{Number, Vector, cross, difference, dot, sign_of, vector};
-use super::plane::{Quotient, quotient};
+use super::plane::{Quotient, quotient, quotient_closely};
 use super::ratio::{self, Ratio};
 use super::triangle::edge_sign;
 use crate::{Aabb, Hit, Interval, Ray};
@@ -129,7 +129,8 @@ pub fn intersect(ray: &Ray, polygon: &Contours, within: Interval) -> Option<Hit>
 #[inline(always)]
 #[must_use]
 pub fn intersect_with<P: Product>(ray: &Ray, polygon: &Contours, within: Interval) -> Option<Hit> {
-    match quotient::<P>(ray, polygon.vertices[0], polygon.normal, within) {
+    let [n, n_lo] = &polygon.normal;
+    match quotient::<P, false>(P::cpu(), ray, &polygon.vertices[0], n, Some(n_lo), within) {
         Quotient::Outside => None,
         Quotient::Inside { lambda, error } => {
             let hit = Hit { lambda, error, uv: DVec2::ZERO, part: 0 };
@@ -263,12 +264,17 @@ fn refine(ray: &Ray, polygon: &Contours, within: Interval) -> Option<Hit> {
         return None;
     }
     let point = polygon.vertices[0];
-    let (lambda, error) = ratio::refine(
-        || plane(ray, point, &polygon.bounded_normal()),
-        || plane(ray, point, &polygon.exact_normal),
-        within,
-        ratio::floor(ray, point),
-    )?;
+    let [n, n_lo] = &polygon.normal;
+    let (lambda, error) = match quotient_closely(ray, &point, n, Some(n_lo), within) {
+        Quotient::Outside => return None,
+        Quotient::Inside { lambda, error } => (lambda, error),
+        Quotient::Uncertain => ratio::refine(
+            || plane(ray, point, &polygon.bounded_normal()),
+            || plane(ray, point, &polygon.exact_normal),
+            within,
+            ratio::floor(ray, point),
+        )?,
+    };
     Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 })
 }
 

@@ -1,16 +1,17 @@
 //! A triangle, decided exactly.
 //!
-//! The three edge functions of Möller and Trumbore 1997 in the arrangement that shares d×(o−a), their signs certified
-//! by one filter; then one step of iterative refinement, with the residual to twice the precision, gives λ and the
-//! weights to the last bit, and its size is the proof. Where the filter is silent the signs are found in integers,
-//! double-doubles or [`Dyadic`]s. docs/numerics.md §4.
+//! The three edge functions of Möller and Trumbore 1997 in the arrangement that shares d×(o−a), their signs certified by
+//! one filter; λ is the plane's quotient with a normal in double-double, its bound proved beforehand. Where the filter is
+//! silent the signs are found in double-double, in integers or by [`Dyadic`]s. docs/numerics.md §4.
 
-use super::bound::{LARGE, SMALL, TRIANGLE_SIDES, TRIANGLE_STEP, U, UNDERFLOW};
+use super::bound::{TRIANGLE_CLOSE, TRIANGLE_LAMBDA, TRIANGLE_SIDES, U, UNDERFLOW};
 use super::bounded::Bounded;
 use super::cpu;
 use super::dyadic::Dyadic;
 use super::eft::{Fused, Product, Split, two_diff, two_sum};
 use super::fixed;
+use super::float::power;
+use super::lanes::{Double, Lanes};
 use super::number::{self, Number, cross, difference, dot, vector};
 use super::ratio::{self, Ratio};
 use crate::{Hit, Interval, Ray};
@@ -21,15 +22,16 @@ use std::cmp::Ordering;
 ///
 /// Edges and vertices belong to the triangle; a ray in its plane misses, and so does every ray of a triangle whose
 /// vertices lie on one line. Hit or miss, and inside the interval or not, are decided as real arithmetic on the floats
-/// given would; λ is within 4 ulp and `error` is proved. `uv` holds the weights of the second and third vertex.
+/// given would; λ is within 4 ulp and `error` is proved. `uv` holds the weights of the second and third vertex, to 2⁻²⁴
+/// or better.
 #[inline]
 #[must_use]
 pub fn intersect(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
-    cpu::dispatch(
+    cpu::dispatch_lanes(
         #[inline(always)]
-        || intersect_with::<Fused>(ray, vertices, within),
+        |cpu| fast::<Fused>(cpu, ray, vertices, within),
         #[inline(always)]
-        || intersect_with::<Split>(ray, vertices, within),
+        || fast::<Split>((), ray, vertices, within),
     )
 }
 
@@ -38,82 +40,209 @@ pub fn intersect(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<H
 #[inline(always)]
 #[must_use]
 pub fn intersect_with<P: Product>(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
-    let (o, d) = (ray.origin, ray.direction);
-    let [a, b, c] = *vertices;
+    fast::<P>(P::cpu(), ray, vertices, within)
+}
+
+#[inline(always)]
+fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
+    let lanes = |v: DVec3| P::Lanes::of(cpu, v);
+    let (o, d, [a, b, c]) = (lanes(ray.origin), lanes(ray.direction), vertices.map(lanes));
     // u·e₁ + v·e₂ − λ·d = s
-    let (e1, e2, s) = (b - a, c - a, o - a);
-    let n = e1.cross(e2);
-    let q = d.cross(s);
-    let det = n.dot(d);
-    let (su, sv) = (q.dot(e2), -q.dot(e1));
-    let sw = det - su - sv;
+    let (e1, e2, s) = (Double::difference(b, a), Double::difference(c, a), Double::difference(o, a));
+    let (n, q) = (e1.cross(e2), d.cross(s.hi));
+    let (nd, ns) = (n.times_float(d), n.times(s));
+    let [x, y, z] = Lanes::columns([nd.hi, ns.hi, q * e2.hi, q * e1.hi]);
+    let (xy, rounding) = two_sum(x, y);
+    let (forms, more_rounding) = two_sum(xy, z);
+    let [det, height, su, minus_sv] = forms.to_array();
 
-    let (m1, m2, ms, md) = (largest(e1), largest(e2), largest(s), largest(d));
-    let m12 = m1 * m2;
-    // NaN or infinite wherever anything is, and then nothing below is certain.
-    let underflow = UNDERFLOW * (1.0 + m1 + m2 + ms + md);
-    let bound = TRIANGLE_SIDES * (md * (m12 + ms * (m1 + m2))) + underflow + 0.0 * sw;
-    let positive = (su > bound) | (sv > bound) | (sw > bound);
-    let negative = (su < -bound) | (sv < -bound) | (sw < -bound);
-    if positive & negative {
+    let sizes = Sizes::new([e1.hi, e2.hi, s.hi, d]);
+    let size = sizes.of_sides();
+    if !sizes.are_ordinary() {
+        return closely(ray, vertices, within);
+    }
+    let bound = TRIANGLE_SIDES * size + VANISHED;
+    let (sv, sw) = (-minus_sv, (det - su) + minus_sv);
+    let (least, most) = extremes(su, sv, sw);
+    if (least < -bound) & (most > bound) {
         return None;
     }
-    let certain = (su.abs() > bound) & (sv.abs() > bound) & (sw.abs() > bound);
-    if !certain && !is_hit(ray, vertices) {
-        return None;
+    if !((least > bound) | (most < -bound)) {
+        return closely(ray, vertices, within);
     }
 
+    // Proved before it is computed.
     let inverse = 1.0 / det;
-    let (mut u, mut v, mut lambda) = (su * inverse, sv * inverse, -n.dot(s) * inverse);
-    let condition = (m12 * inverse).abs(); // κ/|d|∞
-    let kappa = condition * md;
-    let vanished = underflow * inverse.abs();
-    let usable = (kappa < 1.0 / (256.0 * U))
-        & (vanished < 1.0)
-        & (lambda.abs() + det.abs() + md + m1 + m2 + ms < LARGE)
-        & !within.is_empty();
-    if !usable {
-        return refine(ray, vertices, within);
+    let first = -height * inverse;
+    let ulp = U * first.abs();
+    let beyond_rounding = TRIANGLE_LAMBDA * (sizes.m12 * inverse.abs() * (sizes.s + first.abs() * sizes.d));
+    let error = (ulp + beyond_rounding) * (1.0 + 4.0 * U);
+    let known = (beyond_rounding < 3.0 * ulp) & (height.abs() > VANISHED);
+    if !known || bound > WEIGHT * det.abs() {
+        return closely(ray, vertices, within);
     }
-    // Far outside already?
-    let off = 64.0 * U * condition * (ms + lambda.abs() * md) + vanished + SMALL;
-    if (lambda + off < within.min) | (lambda - off > within.max) {
+    let [lx, ly, lz] = Lanes::columns([nd.lo, ns.lo, nd.lo, ns.lo]);
+    let [det_lo, height_lo, ..] = ((rounding + more_rounding) + ((lx + ly) + lz)).to_array();
+    let (t, t_lo) = P::two_product(first, det);
+    let remainder = ((height + t) + t_lo) + (height_lo + first * det_lo);
+    let lambda = first - remainder * inverse;
+    if (lambda - error > within.min) & (lambda + error < within.max) {
+        // Positive, and rounded above one at most.
+        return Some(Hit { lambda, error, uv: DVec2::new(su * inverse, sv * inverse).min(DVec2::ONE), part: 0 });
+    }
+    if (lambda + error < within.min) | (lambda - error > within.max) {
         return None;
     }
-    // One step is enough unless the triangle is thin or met at a grazing angle.
-    for _ in 0..STEPS {
-        let r = DVec3::new(
-            residual::<P>([o.x, d.x, a.x, b.x, c.x], [lambda, u, v]),
-            residual::<P>([o.y, d.y, a.y, b.y, c.y], [lambda, u, v]),
-            residual::<P>([o.z, d.z, a.z, b.z, c.z], [lambda, u, v]),
-        );
-        let size = ms + lambda.abs() * md + u.abs() * m1 + v.abs() * m2;
-        let qr = d.cross(r);
-        u += qr.dot(e2) * inverse;
-        v -= qr.dot(e1) * inverse;
-        lambda -= n.dot(r) * inverse;
-        let (step, least) = (largest(r) * (TRIANGLE_STEP[0] + TRIANGLE_STEP[1] * kappa), TRIANGLE_STEP[2] * (U * size));
-        let beyond_rounding = condition * (U * (step + least)) + vanished * (1.0 + m12 + size);
-        let error = (U * lambda.abs() + beyond_rounding) * (1.0 + 4.0 * U);
-        let tolerated = 3.0 * U * lambda.abs();
-        if (beyond_rounding < tolerated) | (beyond_rounding * md < FLOOR * ms) {
-            if (lambda - error > within.min) & (lambda + error < within.max) & (lambda.abs() > SMALL) {
-                return Some(Hit { lambda, error, uv: weights(u, v), part: 0 });
-            }
-            if (lambda + error < within.min) | (lambda - error > within.max) {
-                return None;
-            }
-            break;
-        }
-        if step < least {
-            break;
-        }
+    closely(ray, vertices, within)
+}
+
+/// The largest components of e₁ and e₂, together and times each other, of s and of d.
+struct Sizes {
+    sum: f64,
+    m12: f64,
+    s: f64,
+    d: f64,
+}
+
+impl Sizes {
+    #[inline(always)]
+    fn new<L: Lanes>(vectors: [L; 4]) -> Self {
+        let [m1, m2, s, d] = L::largest(vectors);
+        Self { sum: m1 + m2, m12: m1 * m2, s, d }
+    }
+
+    /// Nothing overflows, and underflow costs less than [`VANISHED`].
+    #[inline(always)]
+    fn are_ordinary(&self) -> bool {
+        (self.sum + self.s) + self.d < LARGEST
+    }
+
+    /// What an edge function's error is proportional to.
+    #[inline(always)]
+    fn of_sides(&self) -> f64 {
+        self.d * (self.m12 + self.s * self.sum)
+    }
+}
+
+/// Coordinates' differences and directions stay below this, together.
+const LARGEST: f64 = power(250);
+/// Triple products of such numbers lose less than 2⁻⁸²⁰ by underflow: nothing if they are above this.
+const VANISHED: f64 = power(-640);
+/// How far off the weights may be that the fast path gives.
+const WEIGHT: f64 = power(-24);
+
+/// The least and the largest; the third if it is NaN.
+#[inline(always)]
+fn extremes(u: f64, v: f64, w: f64) -> (f64, f64) {
+    let (least, most) = (if u < v { u } else { v }, if u > v { u } else { v });
+    (if least < w { least } else { w }, if most > w { most } else { w })
+}
+
+/// All four triple products in double-double, for near-ties, thin or grazed triangles and origins next to the plane.
+#[cold]
+#[inline(never)]
+fn closely(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
+    #[cfg(test)]
+    tests::COLD.with(|n| n.set(n.get() + 1));
+    let forms = Forms::of(ray, vertices);
+    if !forms.is_hit().unwrap_or_else(|| is_hit(ray, vertices)) {
+        return None;
+    }
+    let [lambda, error] = forms.lambda();
+    let inside = (lambda - error > within.min) & (lambda + error < within.max);
+    if inside {
+        return Some(Hit { lambda, error, uv: weights(forms.uv[0], forms.uv[1]), part: 0 });
+    }
+    if (lambda + error < within.min) | (lambda - error > within.max) {
+        return None;
     }
     refine(ray, vertices, within)
 }
 
-/// What a triangle may need at most: each step leaves less than a quarter of the error, as a rule 10⁻¹⁰ of it.
-const STEPS: usize = 4;
+/// The triple products, normalised, and the quotients that follow.
+struct Forms {
+    sides: [f64; 3],
+    uv: [f64; 2],
+    /// An unevaluated sum.
+    lambda: [f64; 2],
+    inverse: f64,
+    sizes: Sizes,
+}
+
+impl Forms {
+    fn of(ray: &Ray, vertices: &[DVec3; 3]) -> Self {
+        cpu::dispatch_lanes(
+            #[inline(always)]
+            |cpu| Self::new::<Fused>(cpu, ray, vertices),
+            #[inline(always)]
+            || Self::new::<Split>((), ray, vertices),
+        )
+    }
+
+    /// D, s(c,a), −s(a,b) and n·s, normalised.
+    #[inline(always)]
+    fn products<P: Product>(
+        cpu: <P::Lanes as Lanes>::Cpu,
+        ray: &Ray,
+        vertices: &[DVec3; 3],
+    ) -> (Double<P::Lanes>, Sizes) {
+        let lanes = |v: DVec3| P::Lanes::of(cpu, v);
+        let (o, d, [a, b, c]) = (lanes(ray.origin), lanes(ray.direction), vertices.map(lanes));
+        let (e1, e2, s) = (Double::difference(b, a), Double::difference(c, a), Double::difference(o, a));
+        let (n, q) = (e1.cross(e2), s.crossed_by(d));
+        let products = [n.times_float(d), q.times(e2), q.times(e1), n.times(s)];
+        (Double::sums(products), Sizes::new([e1.hi, e2.hi, s.hi, d]))
+    }
+
+    #[inline(always)]
+    fn new<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3; 3]) -> Self {
+        let (products, sizes) = Self::products::<P>(cpu, ray, vertices);
+        let ([det, su, minus_sv, _], [det_lo, su_lo, minus_sv_lo, _]) =
+            (products.hi.to_array(), products.lo.to_array());
+        let (rest, rounding) = two_diff(det, su);
+        let (sw, more_rounding) = two_sum(rest, minus_sv);
+        let sw = sw + ((rounding + more_rounding) + ((det_lo - su_lo) + minus_sv_lo));
+        let (quotients, inverse) = products.over_first();
+        let [_, u, minus_v, _] = (quotients.hi + quotients.lo).to_array();
+        let ([.., q], [.., correction]) = (quotients.hi.to_array(), quotients.lo.to_array());
+        let sides = [su + su_lo, -(minus_sv + minus_sv_lo), sw];
+        Self { sides, uv: [u, -minus_v], lambda: [-q, -correction], inverse, sizes }
+    }
+
+    /// Whether the triangle is hit, if the edge functions are certain.
+    fn is_hit(&self) -> Option<bool> {
+        let bound = TRIANGLE_CLOSE * self.sizes.of_sides() + VANISHED;
+        let [su, sv, sw] = self.sides;
+        let (least, most) = extremes(su, sv, sw);
+        let certain = self.sizes.are_ordinary() & ((least > bound) | (most < -bound));
+        if certain {
+            return Some(true);
+        }
+        (self.sizes.are_ordinary() & (least < -bound) & (most > bound)).then_some(false)
+    }
+
+    /// λ and its error; NaN where it is not known as well as is promised.
+    fn lambda(&self) -> [f64; 2] {
+        let lambda = self.lambda[0] + self.lambda[1];
+        let beyond_rounding = self.beyond_rounding();
+        let sharp =
+            (beyond_rounding < 3.0 * U * lambda.abs()) | (beyond_rounding * self.sizes.d < FLOOR * self.sizes.s);
+        // 1/|D| and |N|/|D|: neither D nor N has vanished.
+        let over = self.inverse.abs();
+        let present = (over < 1.0 / VANISHED) & (lambda.abs() > VANISHED * over);
+        if sharp & present & self.sizes.are_ordinary() {
+            [lambda, (U * lambda.abs() + beyond_rounding) * (1.0 + 4.0 * U)]
+        } else {
+            [f64::NAN; 2]
+        }
+    }
+
+    /// How far off λ is as an unevaluated sum.
+    fn beyond_rounding(&self) -> f64 {
+        let Sizes { m12, s, d, .. } = self.sizes;
+        TRIANGLE_CLOSE * (m12 * self.inverse.abs() * (s + self.lambda[0].abs() * d))
+    }
+}
 
 /// λ need not be better known than to 4u·2⁻⁴⁰ of the largest coordinate over the direction's length, here in largest
 /// components of o−a, which is at most twice that coordinate, and d.
@@ -124,21 +253,6 @@ fn largest(v: DVec3) -> f64 {
     let (x, y, z) = (v.x.abs(), v.y.abs(), v.z.abs());
     let m = if x > y { x } else { y };
     if m > z { m } else { z }
-}
-
-/// One component of o + λd − a − u(b−a) − v(c−a), off by 2u of itself and 18u² of the terms.
-#[inline(always)]
-fn residual<P: Product>([o, d, a, b, c]: [f64; 5], [lambda, u, v]: [f64; 3]) -> f64 {
-    let (s, s_lo) = two_diff(o, a);
-    let (e1, e1_lo) = two_diff(b, a);
-    let (e2, e2_lo) = two_diff(c, a);
-    let (p, p_lo) = P::two_product(lambda, d);
-    let (f, f_lo) = P::two_product(u, e1);
-    let (g, g_lo) = P::two_product(v, e2);
-    let (x, x_lo) = two_sum(s, p);
-    let (y, y_lo) = two_sum(f, g);
-    let low = ((x_lo - y_lo) + (s_lo + p_lo)) - ((f_lo + g_lo) + (u * e1_lo + v * e2_lo));
-    (x - y) + low
 }
 
 /// Weights as they are handed out: what rounding took below zero or above one is put back.
@@ -295,9 +409,13 @@ pub fn normal(vertices: &[DVec3; 3]) -> DVec3 {
         .unwrap_or_else(|| number::unit(&form::<Dyadic>(vertices)).unwrap_or_default())
 }
 
-/// The point a + u·(b−a) + v·(c−a), and a bound on its distance from the triangle's plane; u, v ≥ 0.
+/// The point a + u·(b−a) + v·(c−a), and a bound on its distance from the triangle's plane. The weights u, v ≥ 0 are those
+/// of a hit of `ray`; here they are found again, to the last bit or nearly.
 #[must_use]
-pub fn point(&[a, b, c]: &[DVec3; 3], uv: DVec2) -> (DVec3, f64) {
+pub fn point(ray: &Ray, vertices: &[DVec3; 3], uv: DVec2) -> (DVec3, f64) {
+    let forms = Forms::of(ray, vertices);
+    let uv = if forms.lambda()[0].is_nan() { uv } else { weights(forms.uv[0], forms.uv[1]) };
+    let [a, b, c] = *vertices;
     let (f, g) = (uv.x * (b - a), uv.y * (c - a));
     let position = a + (f + g);
     // Each of b−a, its multiple and their sum is rounded, then the sum with a; underflow is below the last place.
@@ -317,52 +435,106 @@ pub fn side(vertices: &[DVec3; 3], point: DVec3) -> Ordering {
 
 #[cfg(test)]
 mod tests {
+    use super::super::lanes::Plain;
+    use super::super::search::{Rational, climb, cross3, dot3, each, exact, minus};
     use super::*;
-    use proptest::prelude::*;
-    use proptest::test_runner::{Config, TestRunner};
+    use std::cell::Cell;
 
-    /// The largest |error|/(u·size) of the edge functions in plain f64, by hill climbing from random rays.
+    thread_local! {
+        /// How often the fast path was left.
+        pub(super) static COLD: Cell<usize> = const { Cell::new(0) };
+    }
+
+    /// From near and far, thin and plump, steep and grazing: vertices, and a ray at a point of their plane.
+    fn setting(x: &[f64]) -> (Ray, [DVec3; 3]) {
+        let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
+        let (a, e1) = (v(0), v(3));
+        let e2 = e1 * x[17] + v(6) * x[15].powi(7);
+        let target = a + x[18].abs() * 0.5 * e1 + x[19].abs() * 0.5 * e2;
+        let n = e1.cross(e2).normalize_or(DVec3::Z);
+        let across = n.cross(v(9));
+        let direction = across + n * x[16].powi(9) + 1e-3 * x[14] * v(12);
+        (Ray { origin: target - direction * 2f64.powf(12.0 * x[13]), direction }, [a, a + e1, a + e2])
+    }
+
+    const DIMENSION: usize = 20;
+
+    /// D, s(c,a), s(a,b), s(b,c) and n·s, exactly.
+    fn exact_products(ray: &Ray, &[a, b, c]: &[DVec3; 3]) -> [Rational; 5] {
+        let (e1, e2, s, d) = (minus(b, a), minus(c, a), minus(ray.origin, a), exact(ray.direction));
+        let (n, q) = (cross3(&e1, &e2), cross3(&d, &s));
+        let (det, su, sv) = (dot3(&n, &d), dot3(&q, &e2), -dot3(&q, &e1));
+        let sw = &det - &su - &sv;
+        [det, su, sv, sw, dot3(&n, &s)]
+    }
+
+    fn distance(exact: &Rational, parts: [f64; 2]) -> f64 {
+        let [hi, lo] = parts.map(|x| Rational::try_from(x).unwrap());
+        (exact - hi - lo).to_f64().value().abs()
+    }
+
     #[test]
-    fn the_filter_holds_against_an_adversary() {
-        let ratio = |x: &[f64]| {
-            let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
-            let (ray, t) = (Ray::new(v(0), v(3)), [v(6), v(9), v(12)]);
+    fn no_input_reaches_the_bounds_of_the_sides() {
+        let worst = climb("triangle: edge filter", DIMENSION, |x| {
+            let (ray, t) = setting(x);
             let (d, e1, e2, s) = (ray.direction, t[1] - t[0], t[2] - t[0], ray.origin - t[0]);
             let (q, det) = (d.cross(s), e1.cross(e2).dot(d));
             let (su, sv) = (q.dot(e2), -q.dot(e1));
-            let (m1, m2, ms) = (largest(e1), largest(e2), largest(s));
-            let size = U * (largest(d) * (m1 * m2 + ms * (m1 + m2)));
-            let exact = sides::<Dyadic>(&ray, &t);
-            let off = |i: usize, f: f64| exact[i].minus(&f.into()).approximately().abs() / size;
-            off(0, su).max(off(1, sv)).max(off(2, det - su - sv))
+            let lanes = [e1, e2, s, d].map(|v| Plain::of((), v));
+            let bound = TRIANGLE_SIDES * Sizes::new(lanes).of_sides();
+            let exact = exact_products(&ray, &t);
+            let sides = [su, sv, det - su - sv].into_iter();
+            let off = sides.zip(&exact[1..]).map(|(f, e)| distance(e, [f, 0.0]) / bound);
+            Some(off.fold(0.0, f64::max))
+        });
+        assert!((0.01..1.0).contains(&worst));
+        let worst = climb("triangle: edge functions in double-double", DIMENSION, |x| {
+            let (ray, t) = setting(x);
+            let (products, sizes) = Forms::products::<Split>((), &ray, &t);
+            let (hi, lo) = (products.hi.to_array(), products.lo.to_array());
+            let [det, su, sv, ..] = exact_products(&ray, &t);
+            let off = |i: usize, exact: &Rational| distance(exact, [hi[i], lo[i]]);
+            let off = off(0, &det).max(off(1, &su)).max(off(2, &(-sv)));
+            Some(off / (TRIANGLE_CLOSE * sizes.of_sides()))
+        });
+        assert!((0.003..1.0).contains(&worst));
+    }
+
+    #[test]
+    fn no_input_reaches_the_bounds_of_lambda() {
+        let exact_lambda = |ray: &Ray, t: &[DVec3; 3]| {
+            let [det, .., height] = exact_products(ray, t);
+            -height / det
         };
-        let mut runner = TestRunner::new_with_rng(
-            Config::default(),
-            proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha),
-        );
-        let mut draw = |n: usize| {
-            let strategy = prop::collection::vec(-1.0..1.0f64, n);
-            proptest::strategy::ValueTree::current(&strategy.new_tree(&mut runner).unwrap())
-        };
-        let mut worst: f64 = 0.0;
-        for _ in 0..40 {
-            let mut x = draw(15);
-            let mut best = ratio(&x);
-            for k in 0..400 {
-                let (step, mut y) = (draw(15), x.clone());
-                let scale = 0.5f64.powi(k / 10);
-                for i in 0..15 {
-                    y[i] += scale * step[i];
-                }
-                let r = ratio(&y);
-                if r > best {
-                    (x, best) = (y, r);
-                }
-            }
-            worst = worst.max(best);
-        }
-        println!("largest |error|/bound of the edge filter: {:.3}", worst * U / TRIANGLE_SIDES);
-        assert!(worst > 1.0 && worst * U < TRIANGLE_SIDES);
+        let worst = climb("triangle: λ and its rounding", DIMENSION, |x| {
+            let (ray, t) = setting(x);
+            let hit = fast::<Split>((), &ray, &t, Interval::LINE)?;
+            Some(distance(&exact_lambda(&ray, &t), [hit.lambda, 0.0]) / hit.error)
+        });
+        assert!((0.9..1.0).contains(&worst));
+        let worst = climb("triangle: λ in double-double", DIMENSION, |x| {
+            let (ray, t) = setting(x);
+            let forms = Forms::new::<Split>((), &ray, &t);
+            let known = !forms.lambda()[0].is_nan();
+            known.then(|| distance(&exact_lambda(&ray, &t), forms.lambda) / forms.beyond_rounding())
+        });
+        assert!((0.003..1.0).contains(&worst));
+    }
+
+    #[test]
+    fn ordinary_rays_hardly_ever_need_the_cold_path() {
+        let (mut cases, mut hits) = (0, 0);
+        each(400_000, 14, |x| {
+            let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
+            let (origin, t) = (5.0 * v(0), [v(3), v(6), v(9)]);
+            let target = t[0] + x[12].abs() * (t[1] - t[0]) + x[13].abs() * (t[2] - t[0]);
+            let ray = Ray { origin, direction: target - origin };
+            cases += 1;
+            hits += usize::from(intersect(&ray, &t, Interval::FORWARD).is_some());
+        });
+        let cold = COLD.get();
+        println!("triangle: {cold} of {cases} ordinary rays, {hits} hits");
+        assert!(cold * 10_000 < cases && hits * 3 > cases);
     }
 
     /// A ray through an edge or a vertex of a closed surface crosses an even number of triangles.

@@ -68,8 +68,8 @@ impl Shape for Triangle {
         Aabb::around_images(&self.vertices, map)
     }
 
-    fn point(&self, _: &Ray, hit: &Hit) -> SurfacePoint {
-        let (position, error) = triangle::point(&self.vertices, hit.uv);
+    fn point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let (position, error) = triangle::point(ray, &self.vertices, hit.uv);
         SurfacePoint { position, error }
     }
 

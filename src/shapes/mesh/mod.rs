@@ -180,8 +180,8 @@ impl Shape for Mesh {
         wa * a + wb * b + wc * c
     }
 
-    fn point(&self, _: &Ray, hit: &Hit) -> SurfacePoint {
-        let (position, error) = triangle::point(&self.vertices(hit.part), hit.uv);
+    fn point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let (position, error) = triangle::point(ray, &self.vertices(hit.part), hit.uv);
         SurfacePoint { position, error }
     }
 

@@ -1,0 +1,274 @@
+//! The components of a vector side by side in one register: one instruction for all three.
+//!
+//! What the flat kernels are written in. Each kind of [`Product`] has its own, with the same rounded operations in the
+//! same order, so that their bits agree.
+
+use super::eft::{Product, Split, two_diff, two_sum};
+use fearless_simd::{Simd, SimdFrom, f64x4};
+use glam::DVec3;
+use std::fmt::Debug;
+use std::ops::{Add, Mul, Sub};
+
+/// Four floats: x, y, z and one that means nothing.
+pub trait Lanes: Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// The proof that this CPU has the instructions.
+    type Cpu: Copy;
+    /// These four.
+    fn new(cpu: Self::Cpu, lanes: [f64; 4]) -> Self;
+    /// Another four, on the CPU of this.
+    #[must_use]
+    fn like(self, lanes: [f64; 4]) -> Self;
+    /// All four.
+    fn to_array(self) -> [f64; 4];
+    /// |self|.
+    #[must_use]
+    fn abs(self) -> Self;
+    /// The larger in each lane; either of them where one is NaN.
+    #[must_use]
+    fn max(self, other: Self) -> Self;
+    /// [`Product::two_product`] in each lane.
+    fn two_product(self, other: Self) -> (Self, Self);
+
+    /// The components of `v`.
+    #[inline(always)]
+    fn of(cpu: Self::Cpu, v: DVec3) -> Self {
+        Self::new(cpu, [v.x, v.y, v.z, v.z])
+    }
+
+    /// `x` in each lane, on the CPU of this.
+    #[inline(always)]
+    #[must_use]
+    fn splat(self, x: f64) -> Self {
+        self.like([x; 4])
+    }
+
+    /// (y, z, x).
+    #[inline(always)]
+    #[must_use]
+    fn turned(self) -> Self {
+        let [x, y, z, w] = self.to_array();
+        self.like([y, z, x, w])
+    }
+
+    /// self × other.
+    #[inline(always)]
+    #[must_use]
+    fn cross(self, other: Self) -> Self {
+        (self * other.turned() - self.turned() * other).turned()
+    }
+
+    /// The x, the y and the z of four vectors.
+    #[must_use]
+    fn columns(vectors: [Self; 4]) -> [Self; 3];
+
+    /// The largest |component| of four vectors.
+    #[inline(always)]
+    fn largest(vectors: [Self; 4]) -> [f64; 4] {
+        let [x, y, z] = Self::columns(vectors.map(Self::abs));
+        x.max(y).max(z).to_array()
+    }
+}
+
+/// A vector as an unevaluated sum, |lo| at most a few u of |hi|.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Double<L> {
+    pub(super) hi: L,
+    pub(super) lo: L,
+}
+
+impl<L: Lanes> Double<L> {
+    /// a − b, exactly.
+    #[inline(always)]
+    pub(super) fn difference(a: L, b: L) -> Self {
+        let (hi, lo) = two_diff(a, b);
+        Self { hi, lo }
+    }
+
+    /// The products of components.
+    #[inline(always)]
+    pub(super) fn product(a: L, b: L) -> Self {
+        let (hi, lo) = a.two_product(b);
+        Self { hi, lo }
+    }
+
+    /// self × other: with M the product of the largest components |lo| ≤ 8.1uM, off by 28u²M.
+    #[inline(always)]
+    pub(super) fn cross(self, other: Self) -> Self {
+        let (at, bt) = (self.hi.turned(), other.hi.turned());
+        let ((p, p_lo), (m, m_lo)) = (self.hi.two_product(bt), at.two_product(other.hi));
+        let (hi, rounding) = two_diff(p, m);
+        let (forth, back) = (self.hi * other.lo.turned() + self.lo * bt, at * other.lo + self.lo.turned() * other.hi);
+        let lo = ((p_lo - m_lo) + rounding) + (forth - back);
+        Self { hi: hi.turned(), lo: lo.turned() }
+    }
+
+    /// float × self: with M the product of the largest components |lo| ≤ 6.1uM, off by 16u²M.
+    #[inline(always)]
+    pub(super) fn crossed_by(self, float: L) -> Self {
+        let (at, bt) = (float.turned(), self.hi.turned());
+        let ((p, p_lo), (m, m_lo)) = (float.two_product(bt), at.two_product(self.hi));
+        let (hi, rounding) = two_diff(p, m);
+        let lo = ((p_lo - m_lo) + rounding) + (float * self.lo.turned() - at * self.lo);
+        Self { hi: hi.turned(), lo: lo.turned() }
+    }
+
+    /// The products of components.
+    #[inline(always)]
+    pub(super) fn times(self, other: Self) -> Self {
+        let (hi, lo) = self.hi.two_product(other.hi);
+        Self { hi, lo: lo + (self.lo * other.hi + self.hi * other.lo) }
+    }
+
+    /// The products of components.
+    #[inline(always)]
+    pub(super) fn times_float(self, other: L) -> Self {
+        let (hi, lo) = self.hi.two_product(other);
+        Self { hi, lo: lo + self.lo * other }
+    }
+
+    /// x + y + z of four vectors, one in each lane.
+    #[inline(always)]
+    pub(super) fn sums(vectors: [Self; 4]) -> Self {
+        let [x, y, z] = L::columns(vectors.map(|v| v.hi));
+        let [s, t, u] = L::columns(vectors.map(|v| v.lo));
+        let (xy, e) = two_sum(x, y);
+        let (hi, f) = two_sum(xy, z);
+        Self { hi, lo: (e + f) + ((s + t) + u) }
+    }
+
+    /// What is in each lane over what is in the first, off by 40u² of itself and not normalised; and one over the first,
+    /// rounded.
+    #[inline(always)]
+    pub(super) fn over_first(self) -> (Self, f64) {
+        let (hi, lo) = two_sum(self.hi, self.lo);
+        let ([d, ..], [d_lo, ..]) = (hi.to_array(), lo.to_array());
+        let inverse = 1.0 / d;
+        let q = hi * hi.splat(inverse);
+        let (t, t_lo) = q.two_product(hi.splat(d));
+        let remainder = ((hi - t) - t_lo) + (lo - q * hi.splat(d_lo));
+        (Self { hi: q, lo: remainder * hi.splat(inverse) }, inverse)
+    }
+}
+
+impl<S: Simd> Lanes for f64x4<S> {
+    type Cpu = S;
+
+    #[inline(always)]
+    fn new(cpu: S, lanes: [f64; 4]) -> Self {
+        Self::simd_from(cpu, lanes)
+    }
+
+    #[inline(always)]
+    fn like(self, lanes: [f64; 4]) -> Self {
+        Self::simd_from(self.simd, lanes)
+    }
+
+    #[inline(always)]
+    fn to_array(self) -> [f64; 4] {
+        self.into()
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.simd.abs_f64x4(self)
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.simd.max_f64x4(self, other)
+    }
+
+    #[inline(always)]
+    fn columns([a, b, c, d]: [Self; 4]) -> [Self; 3] {
+        let cpu = a.simd;
+        let two = |a: Self, b: Self| {
+            let (xy, z) = (cpu.zip_low_f64x4(a, b), cpu.zip_high_f64x4(a, b));
+            let ((x, y), (z, _)) = (cpu.split_f64x4(xy), cpu.split_f64x4(z));
+            [x, y, z]
+        };
+        let ([x, y, z], [t, u, v]) = (two(a, b), two(c, d));
+        [cpu.combine_f64x2(x, t), cpu.combine_f64x2(y, u), cpu.combine_f64x2(z, v)]
+    }
+
+    /// By fused multiply-add.
+    #[inline(always)]
+    fn two_product(self, other: Self) -> (Self, Self) {
+        let p = self * other;
+        (p, self.simd.mul_sub_precise_f64x4(self, other, p))
+    }
+}
+
+/// Four floats on any CPU; products are those of [`Split`].
+#[derive(Clone, Copy, Debug)]
+pub struct Plain([f64; 4]);
+
+impl Plain {
+    #[inline(always)]
+    fn with(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        let (a, b) = (self.0, other.0);
+        Self([f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2]), f(a[3], b[3])])
+    }
+}
+
+impl Add for Plain {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.with(other, |a, b| a + b)
+    }
+}
+
+impl Sub for Plain {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.with(other, |a, b| a - b)
+    }
+}
+
+impl Mul for Plain {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.with(other, |a, b| a * b)
+    }
+}
+
+impl Lanes for Plain {
+    type Cpu = ();
+
+    #[inline(always)]
+    fn new((): (), lanes: [f64; 4]) -> Self {
+        Self(lanes)
+    }
+
+    #[inline(always)]
+    fn like(self, lanes: [f64; 4]) -> Self {
+        Self(lanes)
+    }
+
+    #[inline(always)]
+    fn to_array(self) -> [f64; 4] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(f64::abs))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.with(other, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn columns([a, b, c, d]: [Self; 4]) -> [Self; 3] {
+        [0, 1, 2].map(|i| Self([a.0[i], b.0[i], c.0[i], d.0[i]]))
+    }
+
+    #[inline(always)]
+    fn two_product(self, other: Self) -> (Self, Self) {
+        (self * other, self.with(other, |a, b| Split::two_product(a, b).1))
+    }
+}
