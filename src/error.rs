@@ -94,6 +94,8 @@ pub enum InvalidShape {
         /// The argument.
         field: &'static str,
     },
+    /// The observer of a long build ended it.
+    Cancelled,
     /// A number so large or so small that the answers could not be represented.
     OutOfRange {
         /// The argument.
@@ -126,6 +128,7 @@ impl fmt::Display for InvalidShape {
                 write!(f, "{field} needs {needed} elements, got {given}")
             }
             Self::Singular { field } => write!(f, "{field} must be an invertible map"),
+            Self::Cancelled => f.write_str("the build was cancelled by its observer"),
             Self::OutOfRange { field, value } => write!(f, "{field} is out of range: {value:e}"),
         }
     }

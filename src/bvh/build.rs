@@ -4,23 +4,40 @@ use super::frame::Frame;
 use super::level::Level;
 use super::split::{self, Split};
 use super::tasks;
+use super::watch::Watch;
 use crate::Aabb;
 use fearless_simd::{Simd, dispatch, f32x4, f32x8, prelude::*};
+use std::ops::Range;
 
-/// An object's box in the frame. The last lanes hold the lower and the upper half of its number, as numbers: as bits
-/// they would be subnormals, whose arithmetic is slow even where nobody wants its result.
+/// The box in the frame around a run of objects. The last lanes hold the lower and the upper half of a number, as
+/// numbers: as bits they would be subnormals, whose arithmetic is slow even where nobody wants its result. The number is
+/// the first object's, and from bit [`COUNT`] on how many follow it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item(pub(super) Box8);
 
+/// Objects have so many bits for their number.
+const COUNT: u32 = 29;
+/// The most objects of a run.
+const LONGEST_RUN: u32 = 2;
+
 impl Item {
-    fn new(frame: &Frame, bounds: &Aabb, index: usize) -> Self {
+    fn new(frame: &Frame, bounds: &Aabb, first: usize, count: u32) -> Self {
         let ([x, y, z], [u, v, w]) = frame.outward(bounds);
-        let (low, high) = ((index & 0xffff) as f32, (index >> 16 & 0xffff) as f32);
+        let number = first as u32 | (count - 1) << COUNT;
+        let (low, high) = ((number & 0xffff) as f32, (number >> 16) as f32);
         Self(Box8([x, y, z, low, -u, -v, -w, high]))
     }
 
-    pub(super) fn index(&self) -> u32 {
-        self.0.0[3] as u32 | (self.0.0[7] as u32) << 16
+    /// The numbers of its objects.
+    pub(super) fn objects(&self) -> Range<u32> {
+        let number = self.0.0[3] as u32 | (self.0.0[7] as u32) << 16;
+        let first = number & ((1 << COUNT) - 1);
+        first..first + (number >> COUNT) + 1
+    }
+
+    #[inline(always)]
+    pub(super) fn count(&self) -> u32 {
+        ((self.0.0[7] as i32 as u32) >> (COUNT - 16)) + 1
     }
 
     /// Twice the centre; NaN for an infinite box.
@@ -62,6 +79,12 @@ impl Box8 {
         let [x, y, z, _, u, v, w, _] = self.0;
         let (x, y, z) = (x + u, y + v, z + w);
         x * y + y * z + z * x
+    }
+
+    /// Twice the centre's coordinate.
+    #[inline(always)]
+    pub(super) fn middle(&self, axis: usize) -> f32 {
+        self.0[axis & 3] - self.0[4 + (axis & 3)]
     }
 
     fn corners(&self) -> ([f32; 3], [f32; 3]) {
@@ -120,16 +143,22 @@ const PARALLEL: usize = 4096;
 
 impl Binary {
     /// The tree over objects 0..count, whose boxes, if finite, lie in `whole`.
-    pub(super) fn new(count: usize, whole: Aabb, bounds: &(impl Fn(usize) -> Aabb + Sync), leaf: u32) -> Self {
-        assert!(count < 1 << 31, "{count} objects are too many for one tree");
+    pub(super) fn new(
+        count: usize,
+        whole: Aabb,
+        bounds: &(impl Fn(usize) -> Aabb + Sync),
+        leaf: u32,
+        watch: &Watch,
+    ) -> Self {
+        assert!(count < 1 << COUNT, "{count} objects are too many for one tree");
         let frame = Frame::around(whole);
-        // An item of no number stands for a box that holds nothing.
-        let mut items = tasks::map(count, |i| {
-            let b = bounds(i);
-            let holds_nothing = b.is_empty() && !b.min.is_nan() && !b.max.is_nan();
-            Item::new(&frame, &b, if holds_nothing { u32::MAX as usize } else { i })
+        let run = if leaf > 1 { LONGEST_RUN } else { 1 };
+        watch.phase(0.2, count);
+        let chunks = tasks::map(count.div_ceil(CHUNK), |chunk| {
+            watch.add(CHUNK);
+            runs(chunk * CHUNK..count.min((chunk + 1) * CHUNK), &frame, bounds, run)
         });
-        items.retain(|i| i.index() != u32::MAX);
+        let mut items = chunks.concat();
         // Those of infinite size last.
         let infinite = |i: &Item| i.0.half_area() == f32::INFINITY;
         let finite = items.len() - items.iter().filter(|i| infinite(i)).count();
@@ -137,9 +166,10 @@ impl Binary {
             items.sort_by_key(infinite);
         }
         let mut nodes = vec![Node::VACANT; 2 * items.len()];
+        watch.phase(0.6, items.len());
         if !items.is_empty() {
             let (root, slots) = nodes.split_at_mut(2);
-            let builder = Builder { level: Level::detect(), leaf, unit: unit(leaf) };
+            let builder = Builder { level: Level::detect(), leaf, unit: unit(leaf), watch };
             let around = |items: &[Item]| dispatch!(builder.level.token(), simd => Box8::around(simd, items));
             let at = Place { item: 0, slot: 2, depth: 0 };
             root[0] = if 0 < finite && finite < items.len() {
@@ -155,17 +185,56 @@ impl Binary {
     }
 }
 
-/// So few items are not split any further: the collapse puts them into leaves as they are, or together with their
+/// Runs begin anew every so many objects, however many threads look for them.
+const CHUNK: usize = 4096;
+
+/// Objects that follow each other and lie together, as a mesh's neighbouring triangles often do, are one item: their
+/// common box has at most this share of the surface of their own boxes.
+const TOGETHER: f64 = 0.7;
+
+fn runs(objects: Range<usize>, frame: &Frame, bounds: &impl Fn(usize) -> Aabb, longest: u32) -> Vec<Item> {
+    let area = |b: &Aabb| {
+        let s = b.size() * frame.scale;
+        s.x * s.y + s.y * s.z + s.z * s.x
+    };
+    let mut items = Vec::with_capacity(objects.len());
+    let mut run = (Aabb::EMPTY, objects.start, 0, 0.0);
+    for i in objects {
+        let own = bounds(i);
+        if own.is_empty() && !own.min.is_nan() && !own.max.is_nan() {
+            // It holds nothing.
+            continue;
+        }
+        let (common, first, count, sum) = run;
+        let (union, sum) = (common.union(own), sum + area(&own));
+        // Not if anything is infinite or NaN.
+        if first + count as usize == i && count < longest && area(&union) <= TOGETHER * sum {
+            run = (union, first, count + 1, sum);
+        } else {
+            if count > 0 {
+                items.push(Item::new(frame, &common, first, count));
+            }
+            run = (own, i, 1, area(&own));
+        }
+    }
+    if run.2 > 0 {
+        items.push(Item::new(frame, &run.0, run.1, run.2));
+    }
+    items
+}
+
+/// So few objects are not split any further: the collapse puts them into leaves as they are, or together with their
 /// neighbours. Smaller units make better trees in less full leaves, and take longer.
-fn unit(leaf: u32) -> usize {
-    (leaf as usize * 3 / 4).max(1)
+fn unit(leaf: u32) -> u32 {
+    (leaf * 3 / 4).max(1)
 }
 
 #[derive(Clone, Copy)]
-struct Builder {
+struct Builder<'a, 'b> {
     level: Level,
     leaf: u32,
-    unit: usize,
+    unit: u32,
+    watch: &'a Watch<'b>,
 }
 
 #[derive(Clone, Copy)]
@@ -175,19 +244,23 @@ struct Place {
     depth: u32,
 }
 
-impl Builder {
+impl Builder<'_, '_> {
     /// The subtree over `items`; the nodes below its root go to `slots`, at most 2·n − 2 of them.
     fn subdivide(self, items: &mut [Item], slots: &mut [Node], bounds: Box8, at: Place) -> Node {
-        if items.len() <= self.unit {
+        let few = |items: &[Item]| {
+            items.len() <= self.unit as usize && items.iter().map(Item::count).sum::<u32>() <= self.unit
+        };
+        if items.len() == 1 || few(items) || self.watch.stopped() {
             let (min, max) = bounds.corners();
             return Node { min, first: at.item, max, count: items.len() as u32 };
         }
-        let split = dispatch!(self.level.token(), simd => split::split(simd, items, at.depth, self.leaf));
+        let split = dispatch!(self.level.token(), simd => split::split(simd, items, at.depth, self.leaf.ilog2()));
         self.inner(items, slots, bounds, at, &split)
     }
 
     fn inner(self, items: &mut [Item], slots: &mut [Node], bounds: Box8, at: Place, split: &Split) -> Node {
-        let parallel = items.len() >= PARALLEL;
+        let n = items.len();
+        let parallel = n >= PARALLEL;
         let &Split { mid, left, right } = split;
         let (pair, rest) = slots.split_at_mut(2);
         let (before, after) = rest.split_at_mut(2 * mid - 2);
@@ -201,6 +274,9 @@ impl Builder {
         );
         pair[0] = l;
         pair[1] = r;
+        if parallel {
+            self.watch.add([mid, n - mid].into_iter().filter(|&n| n < PARALLEL).sum());
+        }
         let (min, max) = bounds.corners();
         Node { min, first: at.slot, max, count: 0 }
     }

@@ -2,6 +2,7 @@
 
 use super::build::{Binary, Item, Node};
 use super::reinsert;
+use super::watch::Watch;
 use super::wide::{LEAF, Wide, WideNode};
 use crate::Aabb;
 
@@ -17,10 +18,22 @@ pub(crate) struct Built {
 
 /// The tree over objects 0..count with the boxes given, which lie in `whole` if they are finite, with at most `leaf` of
 /// them in a leaf.
-pub(crate) fn build(count: usize, whole: Aabb, bounds: &(impl Fn(usize) -> Aabb + Sync), leaf: u32) -> Built {
-    let mut binary = Binary::new(count, whole, bounds, leaf);
-    reinsert::reinsert(&mut binary.nodes);
-    Plan::new(&binary, leaf).collapse(&binary)
+///
+/// `None` if `watch` has stopped it; a tenth of its time is left to the caller.
+pub(crate) fn build(
+    count: usize,
+    whole: Aabb,
+    bounds: &(impl Fn(usize) -> Aabb + Sync),
+    leaf: u32,
+    watch: &Watch,
+) -> Option<Built> {
+    let mut binary = Binary::new(count, whole, bounds, leaf, watch);
+    reinsert::reinsert(&mut binary.nodes, watch);
+    watch.phase(0.9, 1);
+    if watch.stopped() {
+        return None;
+    }
+    Some(Plan::new(&binary, leaf).collapse(&binary))
 }
 
 /// What becomes of each binary node.
@@ -44,22 +57,23 @@ impl Plan {
         let n = binary.nodes.len();
         let mut plan = Self { sizes: vec![0; n], choices: vec![0; n], leaf };
         if n > 0 {
-            plan.costs(&binary.nodes, 0);
+            plan.costs(binary, 0);
         }
         plan
     }
 
     /// The least cost of node `at` in up to 1, 2, … 7 lanes.
-    fn costs(&mut self, nodes: &[Node], at: u32) -> [f32; 7] {
-        let node = &nodes[at as usize];
+    fn costs(&mut self, binary: &Binary, at: u32) -> [f32; 7] {
+        let node = &binary.nodes[at as usize];
         let area = node.half_area();
         if node.is_leaf() {
-            self.sizes[at as usize] = node.count;
+            let items = &binary.items[node.first as usize..][..node.count as usize];
+            self.sizes[at as usize] = items.iter().map(Item::count).sum();
             self.choices[at as usize] = AS_LEAF;
             return [area; 7];
         }
-        let l = self.costs(nodes, node.first);
-        let r = self.costs(nodes, node.first + 1);
+        let l = self.costs(binary, node.first);
+        let r = self.costs(binary, node.first + 1);
         let size = self.sizes[node.first as usize] + self.sizes[node.first as usize + 1];
         self.sizes[at as usize] = size;
         let mut choices = 0u32;
@@ -137,7 +151,7 @@ impl Plan {
                         let node = &binary.nodes[i as usize];
                         if node.is_leaf() {
                             let items = &binary.items[node.first as usize..][..node.count as usize];
-                            objects.extend(items.iter().map(Item::index));
+                            objects.extend(items.iter().flat_map(Item::objects));
                         } else {
                             below.extend([node.first + 1, node.first]);
                         }

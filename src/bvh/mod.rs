@@ -16,6 +16,7 @@ mod slab;
 mod split;
 mod tasks;
 mod traverse;
+mod watch;
 mod wide;
 
 pub use level::Level;
@@ -25,10 +26,12 @@ pub(crate) use frame::Frame;
 pub(crate) use slab::LocalRay;
 pub(crate) use tasks::map;
 pub(crate) use traverse::{Any, Closest, any, closest};
+pub(crate) use watch::Watch;
 pub(crate) use wide::Wide;
 
 use crate::{Aabb, Interval, Ray};
 use fearless_simd::{Simd, dispatch};
+use std::ops::ControlFlow;
 
 /// A tree over the boxes of objects numbered from zero.
 #[derive(Clone, Debug)]
@@ -51,13 +54,42 @@ impl Bvh {
     /// The same boxes give the same tree at any number of threads.
     ///
     /// # Panics
-    /// On 2³¹ boxes or more.
+    /// On 2²⁹ boxes or more.
     #[must_use]
     pub fn build(boxes: &[Aabb]) -> Self {
+        Self::build_watched(boxes, &Watch::nobody()).expect("nobody stops it")
+    }
+
+    /// The same tree, with an observer that is told now and then which share of the build is done, from 0 to 1, never
+    /// less than before, and that may end it: then there is none. Calls come from the threads that build, one at a time.
+    ///
+    /// ```
+    /// use std::ops::ControlFlow;
+    /// use truehit::{Aabb, bvh::Bvh};
+    /// let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 1000];
+    /// let mut last = 0.0;
+    /// let tree = Bvh::build_observed(&boxes, &mut |share| {
+    ///     last = share;
+    ///     ControlFlow::Continue(())
+    /// });
+    /// assert!(tree.is_some() && last == 1.0);
+    /// assert!(Bvh::build_observed(&boxes, &mut |_| ControlFlow::Break(())).is_none());
+    /// ```
+    ///
+    /// # Panics
+    /// On 2²⁹ boxes or more, and if the observer does.
+    pub fn build_observed(boxes: &[Aabb], observer: &mut (dyn FnMut(f64) -> ControlFlow<()> + Send)) -> Option<Self> {
+        Self::build_watched(boxes, &Watch::new(observer))
+    }
+
+    fn build_watched(boxes: &[Aabb], watch: &Watch) -> Option<Self> {
         let sound = boxes.iter().filter(|b| b.is_finite() && !b.is_empty());
         let whole = sound.fold(Aabb::EMPTY, |whole, &b| whole.union(b));
-        let built = build(boxes.len(), whole, &|i| boxes[i], OBJECTS_PER_LEAF);
-        Self { tree: built.tree, objects: built.objects, starts: built.starts, level: Level::detect() }
+        let built = build(boxes.len(), whole, &|i| boxes[i], OBJECTS_PER_LEAF, watch)?;
+        watch.phase(1.0, 1);
+        watch.add(1);
+        let tree = Self { tree: built.tree, objects: built.objects, starts: built.starts, level: Level::detect() };
+        (!watch.stopped()).then_some(tree)
     }
 
     /// Calls `visit(object, bound)` for every object whose box the ray meets between `within.min` and the bound,

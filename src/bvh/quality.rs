@@ -2,6 +2,7 @@
 
 use super::build::half_area;
 use super::collapse::{Built, build};
+use super::watch::Watch;
 use super::wide::{LEAF, NONE};
 use crate::Aabb;
 use glam::DVec3;
@@ -146,7 +147,8 @@ fn load(path: &str) -> Parts {
 
 fn report(name: &str, parts: &Parts, rays: usize) {
     let corners = |i: usize| parts.1[i].map(|v| parts.0[v as usize]);
-    let built = build(parts.1.len(), Aabb::around(&parts.0), &|i| Aabb::around(&corners(i)), 8);
+    let built = build(parts.1.len(), Aabb::around(&parts.0), &|i| Aabb::around(&corners(i)), 8, &Watch::nobody())
+        .expect("nobody stops it");
     let traced = Traced { parts, built: &built };
     let (inner, leaves) = traced.cost();
     let n = parts.1.len() as f64;

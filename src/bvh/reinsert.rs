@@ -7,6 +7,7 @@
 
 use super::build::{self, Node};
 use super::tasks;
+use super::watch::Watch;
 
 /// Passes after which little is left to gain, and how many nodes, one in so many, look around in each.
 const PASSES: u32 = 6;
@@ -24,11 +25,16 @@ struct Move {
 }
 
 /// Makes the tree cheaper in place; siblings stay in pairs.
-pub(super) fn reinsert(nodes: &mut [Node]) {
+pub(super) fn reinsert(nodes: &mut [Node], watch: &Watch) {
+    watch.phase(0.8, PASSES as usize);
     if nodes.len() > 8 {
         let mut tree = Tree::new(nodes);
         for _ in 0..PASSES {
+            if watch.stopped() {
+                return;
+            }
             tree.pass();
+            watch.add(1);
         }
     }
 }
@@ -90,7 +96,7 @@ impl<'a> Tree<'a> {
                 *key &= 0xffff_ffff;
             }
             keys.sort_unstable();
-            tasks::map(chosen, |i| self.best_move(keys[i] as u32))
+            tasks::map_with(chosen, Vec::new, |stack, i| self.best_move(keys[i] as u32, stack))
         };
         let mut moves: Vec<Move> = moves.into_iter().filter(|m| m.gain > 0.0).collect();
         moves.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.from.cmp(&b.from)));
@@ -109,7 +115,7 @@ impl<'a> Tree<'a> {
     }
 
     /// The best new place of `from`; no gain if there is none better than where it is.
-    fn best_move(&self, from: u32) -> Move {
+    fn best_move(&self, from: u32, stack: &mut Vec<(f32, u32)>) -> Move {
         let node = self.node(from);
         let area = node.half_area();
         let parent = self.parent(from);
@@ -118,9 +124,8 @@ impl<'a> Tree<'a> {
         let mut saved = self.node(parent).half_area();
         let mut rest = *self.node(from ^ 1);
         let (mut sibling, mut above) = (from ^ 1, parent);
-        // What is saved, less what those on the way down to here grow by; where.
-        let mut stack: Vec<(f32, u32)> = Vec::with_capacity(64);
         loop {
+            // What is saved, less what those on the way down to here grow by; where.
             stack.push((saved, sibling));
             while let Some((left, at)) = stack.pop() {
                 // Whatever it joins becomes no smaller than itself.

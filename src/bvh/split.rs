@@ -21,28 +21,40 @@ fn halve<S: Simd>(simd: S, items: &[Item]) -> Split {
     Split { mid, left: Box8::around(simd, a), right: Box8::around(simd, b) }
 }
 
+/// Adding this rounds to an integer, which is then in the lowest bits.
+const TO_INTEGER: f32 = 8_388_608.0; // 2²³
+
 /// Which bin an item's centre falls into, on all three axes.
-struct Binning<S: Simd> {
+struct Binning<S: Simd, const BINS: usize> {
     simd: S,
     least: f32x4<S>,
     scale: f32x4<S>,
 }
 
-impl<S: Simd> Binning<S> {
-    /// Adding this rounds to an integer, which is then in the lowest bits.
-    const TO_INTEGER: f32 = 8_388_608.0; // 2²³
-
+impl<S: Simd, const BINS: usize> Binning<S, BINS> {
     #[inline(always)]
     fn bins(&self, item: &Item) -> [usize; 3] {
-        let at = ((item.middle(self.simd) - self.least) * self.scale).max(f32x4::splat(self.simd, 0.0));
-        let at: [f32; 4] = (at + f32x4::splat(self.simd, Self::TO_INTEGER)).into();
+        let at = (item.middle(self.simd) - self.least) * self.scale;
+        let at: [f32; 4] = (at + f32x4::splat(self.simd, TO_INTEGER)).into();
         [0, 1, 2].map(|axis| at[axis].to_bits() as usize & (BINS - 1))
     }
 }
 
-/// Reorders the items, two or more, into two parts. A leaf that holds up to `leaf` of them is tested as one.
+/// Below this number of items half the bins do.
+const FEW: usize = 128;
+
+/// Reorders the items, two or more, into two parts. A leaf that holds up to 2^`leaf` of them is tested as one.
 #[inline(always)]
 pub(super) fn split<S: Simd>(simd: S, items: &mut [Item], depth: u32, leaf: u32) -> Split {
+    if items.len() < FEW {
+        split_in_bins::<S, { BINS / 2 }>(simd, items, depth, leaf)
+    } else {
+        split_in_bins::<S, BINS>(simd, items, depth, leaf)
+    }
+}
+
+#[inline(always)]
+fn split_in_bins<S: Simd, const BINS: usize>(simd: S, items: &mut [Item], depth: u32, leaf: u32) -> Split {
     let mut least = f32x4::splat(simd, f32::INFINITY);
     let mut most = f32x4::splat(simd, f32::NEG_INFINITY);
     for item in &*items {
@@ -56,16 +68,20 @@ pub(super) fn split<S: Simd>(simd: S, items: &mut [Item], depth: u32, leaf: u32)
     if scale[..3] == [0.0; 3] || depth >= DEEPEST_SAH {
         return halve(simd, items);
     }
-    let binning = Binning { simd, least, scale: scale.simd_into(simd) };
+    let binning = Binning::<S, BINS> { simd, least, scale: scale.simd_into(simd) };
     let mut bounds = [[Box8::EMPTY; BINS]; 3];
     let mut counts = [[0u32; BINS]; 3];
-    for item in &*items {
+    // From two places in turn: neighbours share a bin, and would wait for each other.
+    let half = items.len().div_ceil(2);
+    for i in 0..items.len() {
+        let item = &items[i / 2 + half * (i % 2)];
+        let count = item.count();
         for (axis, bin) in binning.bins(item).into_iter().enumerate() {
-            counts[axis][bin] += 1;
+            counts[axis][bin] += count;
             bounds[axis][bin].grow(simd, &item.0);
         }
     }
-    let leaves = |count: u32| count.div_ceil(leaf) as f32;
+    let leaves = |count: u32| ((count + (1 << leaf) - 1) >> leaf) as f32;
     let mut best = (f32::INFINITY, 0, 0);
     for axis in 0..3 {
         if scale[axis] == 0.0 {
@@ -100,9 +116,12 @@ pub(super) fn split<S: Simd>(simd: S, items: &mut [Item], depth: u32, leaf: u32)
     }
     // Without branches: which way an item goes cannot be foreseen.
     let mut mid = 0;
+    let least: [f32; 4] = least.into();
+    let (least, scale) = (least[axis], scale[axis]);
     for i in 0..items.len() {
         let item = items[i];
-        let goes_left = binning.bins(&item)[axis] < boundary;
+        let bin = (item.0.middle(axis) - least) * scale + TO_INTEGER;
+        let goes_left = (bin.to_bits() as usize & (BINS - 1)) < boundary;
         items[i] = items[mid];
         items[mid] = item;
         mid += usize::from(goes_left);

@@ -17,11 +17,20 @@ pub(crate) fn join<A: Send, B: Send>(
 
 /// f(0), f(1), … f(n − 1).
 pub(crate) fn map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    map_with(n, || (), |(), i| f(i))
+}
+
+/// The same with something of its own for every thread.
+pub(crate) fn map_with<T: Send, R>(
+    n: usize,
+    own: impl Fn() -> R + Sync + Send,
+    f: impl Fn(&mut R, usize) -> T + Sync + Send,
+) -> Vec<T> {
     #[cfg(feature = "rayon")]
-    {
+    if rayon::current_num_threads() > 1 {
         use rayon::prelude::*;
-        (0..n).into_par_iter().with_min_len(256).map(f).collect()
+        return (0..n).into_par_iter().map_init(own, f).collect();
     }
-    #[cfg(not(feature = "rayon"))]
-    (0..n).map(f).collect()
+    let mut own = own();
+    (0..n).map(|i| f(&mut own, i)).collect()
 }

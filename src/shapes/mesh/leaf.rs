@@ -72,8 +72,13 @@ impl Leaf {
     }
 }
 
-/// The tree over the triangles, its leaves, whether these hold the vertices exactly, and the box around all.
-pub(super) fn build(positions: &[DVec3], triangles: &[[u32; 3]]) -> (Wide, Vec<Leaf>, bool, Aabb) {
+/// The tree over the triangles, its leaves, whether these hold the vertices exactly, and the box around all; `None` if
+/// `watch` has stopped it.
+pub(super) fn build(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    watch: &bvh::Watch,
+) -> Option<(Wide, Vec<Leaf>, bool, Aabb)> {
     let corners = |i: usize| triangles[i].map(|v| positions[v as usize]);
     let bounds = |i: usize| {
         let t = &triangles[i];
@@ -87,18 +92,24 @@ pub(super) fn build(positions: &[DVec3], triangles: &[[u32; 3]]) -> (Wide, Vec<L
         let p = positions[v as usize];
         b.union(Aabb { min: p, max: p })
     });
-    let built = bvh::build(triangles.len(), whole, &bounds, 8);
+    let built = bvh::build(triangles.len(), whole, &bounds, 8, watch)?;
     let frame = &built.tree.frame;
     let exact = positions.iter().all(|&p| frame.world(frame.local(p).as_vec3().as_dvec3()) == p);
-    let leaves = bvh::map(built.starts.len() - 1, |i| {
+    let count = built.starts.len() - 1;
+    watch.phase(1.0, count);
+    let leaves = bvh::map(count, |i| {
         let mut leaf = Leaf::EMPTY;
         let (from, to) = (built.starts[i] as usize, built.starts[i + 1] as usize);
         for (lane, &number) in built.objects[from..to].iter().enumerate() {
             leaf.set(lane, frame, exact, &corners(number as usize), number);
         }
+        if i % 1024 == 1023 {
+            watch.add(1024);
+        }
         leaf
     });
-    (built.tree, leaves, exact, whole)
+    watch.add(count);
+    (!watch.stopped()).then_some((built.tree, leaves, exact, whole))
 }
 
 /// The ray as the filter wants it: in f32, with the margins' constants.

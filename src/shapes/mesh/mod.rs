@@ -7,11 +7,12 @@ mod attributes;
 mod leaf;
 mod query;
 
-use crate::bvh::{Frame, Level, Wide};
+use crate::bvh::{Frame, Level, Watch, Wide};
 use crate::kernel::triangle;
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DAffine3, DVec2, DVec3};
 use leaf::Leaf;
+use std::ops::ControlFlow;
 
 /// A mesh of triangles: closed sets, each with its edges and vertices, so that neighbours leave no gap.
 ///
@@ -48,6 +49,38 @@ impl Mesh {
     /// # Errors
     /// If a position is not finite, an index names no position, or there are 2²⁹ triangles or more.
     pub fn new(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, InvalidShape> {
+        Self::new_watched(positions, triangles, &Watch::nobody())
+    }
+
+    /// The same mesh, with an observer for builds of seconds: it is told now and then which share is done, from 0 to 1,
+    /// never less than before, and may end the build. Calls come from the threads that build, one at a time.
+    ///
+    /// ```
+    /// use std::ops::ControlFlow;
+    /// use truehit::{InvalidShape, Mesh, glam::DVec3};
+    /// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
+    /// let mut seen = Vec::new();
+    /// let mesh = Mesh::new_observed(corners.clone(), vec![[0, 1, 2]], &mut |share| {
+    ///     seen.push(share);
+    ///     ControlFlow::Continue(())
+    /// })?;
+    /// assert!(seen[0] == 0.0 && seen.last() == Some(&1.0));
+    /// let refused = Mesh::new_observed(corners, vec![[0, 1, 2]], &mut |_| ControlFlow::Break(()));
+    /// assert_eq!(refused.unwrap_err(), InvalidShape::Cancelled);
+    /// # Ok::<(), InvalidShape>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`InvalidShape::Cancelled`] if the observer breaks; otherwise as for [`new`](Self::new).
+    pub fn new_observed(
+        positions: Vec<DVec3>,
+        triangles: Vec<[u32; 3]>,
+        observer: &mut (dyn FnMut(f64) -> ControlFlow<()> + Send),
+    ) -> Result<Self, InvalidShape> {
+        Self::new_watched(positions, triangles, &Watch::new(observer))
+    }
+
+    fn new_watched(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, watch: &Watch) -> Result<Self, InvalidShape> {
         if !positions.iter().all(|p| p.is_finite()) {
             return Err(InvalidShape::NotFinite { field: "positions" });
         }
@@ -60,7 +93,8 @@ impl Mesh {
                 return Err(InvalidShape::IndexOutOfRange { field: "triangles", at, index, count });
             }
         }
-        let (tree, leaves, exact, bounds) = leaf::build(&positions, &triangles);
+        let built = leaf::build(&positions, &triangles, watch);
+        let Some((tree, leaves, exact, bounds)) = built else { return Err(InvalidShape::Cancelled) };
         let level = Level::detect();
         Ok(Self { positions, triangles, normals: Vec::new(), uvs: Vec::new(), bounds, tree, leaves, exact, level })
     }
