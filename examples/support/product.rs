@@ -2,11 +2,14 @@
 
 use crate::obj::Obj;
 use crate::stage::{Props, Stage, half_extent};
+use indicatif::{ProgressBar, ProgressStyle};
 use std::error::Error;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
 use truehit::glam::{DMat3, DVec3};
 use truehit::shading::color::srgb;
 use truehit::shading::{Background, ImageTexture, Light, Material, Mirror, Rgb};
-use truehit::{Aabb, Cone, Mesh, Plane};
+use truehit::{Aabb, Cone, InvalidShape, Mesh, Plane};
 
 /// The picture's vertical angle from outside, in degrees.
 const FIELD_OF_VIEW: f64 = 24.0;
@@ -53,7 +56,7 @@ pub(crate) fn product(
     });
     let distance = 1.06 * distance.fold(0.0, f64::max);
 
-    let mut mesh = Mesh::new(obj.positions, obj.triangles)?.with_normals(obj.normals)?;
+    let mut mesh = build(obj.positions, obj.triangles)?.with_normals(obj.normals)?;
     let mut material = Material::matt(srgb(214, 122, 84)).with_gloss(0.22, 40.0);
     if !obj.uvs.is_empty() {
         mesh = mesh.with_uvs(obj.uvs)?;
@@ -92,4 +95,27 @@ pub(crate) fn product(
         up: DVec3::Y,
         field_of_view,
     })
+}
+
+/// A build that takes longer than this shows how far it is.
+const PATIENCE: Duration = Duration::from_millis(300);
+
+/// The mesh, with a progress bar if it is a large one.
+fn build(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Mesh, InvalidShape> {
+    let (start, mut bar) = (Instant::now(), None);
+    let mesh = Mesh::new_observed(positions, triangles, &mut |share| {
+        if start.elapsed() > PATIENCE {
+            let bar = bar.get_or_insert_with(|| {
+                // Draws to stderr, and to nothing where that is not a terminal.
+                let style = ProgressStyle::with_template("{bar:40} {pos} % of the tree").expect("a template");
+                ProgressBar::new(100).with_style(style)
+            });
+            bar.set_position((100.0 * share) as u64);
+        }
+        ControlFlow::Continue(())
+    });
+    if let Some(bar) = bar {
+        bar.finish_and_clear();
+    }
+    mesh
 }

@@ -23,16 +23,6 @@ struct Calls<'a> {
     last: f64,
 }
 
-impl Calls<'_> {
-    fn report(&mut self, share: f64) -> ControlFlow<()> {
-        if share <= self.last {
-            return ControlFlow::Continue(());
-        }
-        self.last = share;
-        (self.observer)(share)
-    }
-}
-
 impl<'a> Watch<'a> {
     /// Nobody.
     pub(crate) fn nobody() -> Self {
@@ -40,9 +30,10 @@ impl<'a> Watch<'a> {
     }
 
     pub(crate) fn new(observer: Observer<'a>) -> Self {
-        let mut calls = Calls { observer, from: 0.0, to: 0.0, total: 1, last: -1.0 };
-        let stopped = calls.report(0.0).is_break();
-        Self { calls: Some(Mutex::new(calls)), done: AtomicUsize::new(0), stopped: stopped.into() }
+        let calls = Calls { observer, from: 0.0, to: 0.0, total: 1, last: -1.0 };
+        let watch = Self { calls: Some(Mutex::new(calls)), ..Self::nobody() };
+        watch.phase(0.0, 1);
+        watch
     }
 
     /// From now on `total` pieces of work are what lies between the last phase's end and the share `to`.
@@ -53,9 +44,7 @@ impl<'a> Watch<'a> {
             self.done.store(0, Relaxed);
             (calls.from, calls.to, calls.total) = (calls.to, to, total.max(1));
             let from = calls.from;
-            if calls.report(from).is_break() {
-                self.stopped.store(true, Relaxed);
-            }
+            self.report(&mut calls, from);
         }
     }
 
@@ -64,14 +53,19 @@ impl<'a> Watch<'a> {
     pub(crate) fn add(&self, pieces: usize) {
         if let Some(calls) = &self.calls {
             let done = self.done.fetch_add(pieces, Relaxed) + pieces;
-            if !self.stopped()
-                && let Ok(mut calls) = calls.try_lock()
-            {
-                let share = (done as f64 / calls.total as f64).min(1.0);
-                let share = calls.from + share * (calls.to - calls.from);
-                if calls.report(share).is_break() {
-                    self.stopped.store(true, Relaxed);
-                }
+            if let Ok(mut calls) = calls.try_lock() {
+                let part = (done as f64 / calls.total as f64).min(1.0);
+                let share = calls.from + part * (calls.to - calls.from);
+                self.report(&mut calls, share);
+            }
+        }
+    }
+
+    fn report(&self, calls: &mut Calls, share: f64) {
+        if share > calls.last && !self.stopped() {
+            calls.last = share;
+            if (calls.observer)(share).is_break() {
+                self.stopped.store(true, Relaxed);
             }
         }
     }

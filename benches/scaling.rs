@@ -1,0 +1,113 @@
+//! How cost grows: meshes of 10⁴ to 10⁷ triangles, scenes of 10³ to 10⁶ instances. Prints tables, no statistics:
+//! `cargo bench --bench scaling [-- LARGEST]`, the largest number of triangles, 10⁶ unless told; a tenth of it of instances.
+
+#[path = "../tests/meshes/mod.rs"]
+mod meshes;
+
+use meshes::{Parts, Random, icosphere};
+use std::sync::Arc;
+use std::time::Instant;
+use truehit::glam::{DAffine3, DQuat, DVec3};
+use truehit::{Affine, Interval, Mesh, Ray, Scene, Shape};
+
+const RAYS: usize = 200_000;
+
+/// Hills over a square of about n triangles.
+fn terrain(n: usize) -> Parts {
+    let side = (n as f64 / 2.0).sqrt().round() as u32;
+    let at = |i: u32| f64::from(i) / f64::from(side);
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for i in 0..=side {
+        for j in 0..=side {
+            let (x, y) = (at(i), at(j));
+            let hills = (0..6).map(|octave| {
+                let f = f64::from(1 << octave);
+                (7.0 * f * x + 0.3 * f).sin() * (9.0 * f * y + 4.0 * f * x).cos() / f
+            });
+            positions.push(DVec3::new(x, y, 0.05 * hills.sum::<f64>()));
+            if i < side && j < side {
+                let quad = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[a, b]| (i + a) * (side + 1) + j + b);
+                triangles.extend([[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]);
+            }
+        }
+    }
+    (positions, triangles)
+}
+
+/// Seconds, and what came of it.
+fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let start = Instant::now();
+    let result = work();
+    (start.elapsed().as_secs_f64(), result)
+}
+
+fn on_one_thread<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    #[cfg(feature = "rayon")]
+    return rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread").install(work);
+    #[cfg(not(feature = "rayon"))]
+    work()
+}
+
+/// Millions of rays a second, and the share that hit.
+fn rate(rays: &[Ray], hit: impl Fn(&Ray) -> bool) -> (f64, f64) {
+    let (seconds, hits) = timed(|| rays.iter().filter(|r| hit(r)).count());
+    assert!(hits * 10 > rays.len(), "{hits} hits");
+    (rays.len() as f64 / seconds / 1e6, hits as f64 / rays.len() as f64)
+}
+
+fn mesh(parts: Parts) {
+    let n = parts.1.len();
+    let copy = parts.clone();
+    let (serial, _) = timed(|| on_one_thread(|| Mesh::new(copy.0, copy.1)));
+    let (seconds, mesh) = timed(|| Mesh::new(parts.0, parts.1).expect("a terrain"));
+    let mut random = Random(1);
+    let down: Vec<Ray> = (0..RAYS)
+        .map(|_| {
+            let from = DVec3::new(random.unit(), random.unit(), 0.3);
+            Ray::new(from, DVec3::new(0.5 * random.signed(), 0.5 * random.signed(), -1.0))
+        })
+        .collect();
+    let (rate, hits) = rate(&down, |r| mesh.intersect(r, Interval::FORWARD).is_some());
+    println!(
+        "| {n} | {serial:.3} s, {:.2} | {seconds:.3} s, {:.2} | {:.0} | {rate:.2} ({:.0} % hit) |",
+        n as f64 / serial / 1e6,
+        n as f64 / seconds / 1e6,
+        mesh.memory() as f64 / n as f64,
+        100.0 * hits
+    );
+}
+
+fn instances(n: usize) {
+    let (positions, triangles) = icosphere(2);
+    let ball = Arc::new(Mesh::new(positions, triangles).expect("a ball"));
+    let mut random = Random(2);
+    // About as many of them along a ray whatever their number.
+    let size = 0.5 / (n as f64).cbrt();
+    let mut builder = Scene::builder();
+    let (placing, ()) = timed(|| {
+        for _ in 0..n {
+            let turn = DQuat::from_axis_angle(random.direction(), random.unit());
+            let place = DAffine3::from_scale_rotation_translation(DVec3::splat(size), turn, random.in_cube());
+            builder.push(Affine::new(ball.clone(), place).expect("a place"), ());
+        }
+    });
+    let (seconds, scene) = timed(|| builder.build());
+    let rays: Vec<Ray> = (0..RAYS).map(|_| Ray::new(2.0 * random.direction(), random.in_cube())).collect();
+    let rays: Vec<Ray> = rays.into_iter().map(|r| Ray::new(r.origin, r.direction - r.origin)).collect();
+    let (rate, hits) = rate(&rays, |r| scene.intersect(r, Interval::FORWARD).is_some());
+    println!("| {n} | {placing:.3} s | {seconds:.3} s | {rate:.2} ({:.0} % hit) |", 100.0 * hits);
+}
+
+fn main() {
+    let largest = std::env::args().skip(1).find_map(|a| a.parse::<f64>().ok()).unwrap_or(1e6) as usize;
+    println!(
+        "| triangles | build, one thread (M/s) | build (M/s) | bytes a triangle | Mray/s |\n|---|---|---|---|---|"
+    );
+    for n in [10_000, 100_000, 1_000_000, 10_000_000].into_iter().filter(|&n| n <= largest) {
+        mesh(terrain(n));
+    }
+    println!("\n| instances | placing | scene | Mray/s |\n|---|---|---|---|");
+    for n in [1000, 10_000, 100_000, 1_000_000].into_iter().filter(|&n| n <= largest / 10) {
+        instances(n);
+    }
+}
