@@ -8,6 +8,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use meshes::{Random, icosphere, moved, torus};
 use std::hint::black_box;
+use std::ops::ControlFlow;
 use truehit::bvh::Level;
 use truehit::{Interval, Mesh, Ray, Shape, glam};
 
@@ -114,14 +115,23 @@ fn leaf(c: &mut Criterion) {
     group.finish();
 }
 
+/// On one thread, on all, and with an observer that only looks.
 fn build(c: &mut Criterion) {
     let mut group = c.benchmark_group("build");
     group.sample_size(10);
     for n in [22, 70, 220] {
         let (positions, triangles) = torus(n);
-        group.throughput(Throughput::Elements(triangles.len() as u64));
-        group.bench_function(format!("{} triangles", triangles.len()), |b| {
-            b.iter(|| Mesh::new(positions.clone(), triangles.clone()));
+        let n = triangles.len();
+        group.throughput(Throughput::Elements(n as u64));
+        let mesh = || Mesh::new(positions.clone(), triangles.clone());
+        group.bench_function(format!("{n} triangles"), |b| b.iter(mesh));
+        group.bench_function(format!("{n} triangles, observed"), |b| {
+            b.iter(|| Mesh::new_observed(positions.clone(), triangles.clone(), &mut |_| ControlFlow::Continue(())));
+        });
+        #[cfg(feature = "rayon")]
+        group.bench_function(format!("{n} triangles, one thread"), |b| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+            pool.install(|| b.iter(mesh));
         });
     }
     group.finish();

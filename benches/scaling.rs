@@ -34,6 +34,13 @@ fn terrain(n: usize) -> Parts {
     (positions, triangles)
 }
 
+/// Bytes of memory in use, where the system tells.
+fn resident() -> f64 {
+    let pages = std::fs::read_to_string("/proc/self/statm").ok();
+    let pages = pages.and_then(|text| text.split(' ').nth(1)?.parse::<f64>().ok());
+    pages.map_or(f64::NAN, |pages| 4096.0 * pages)
+}
+
 /// Seconds, and what came of it.
 fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let start = Instant::now();
@@ -83,6 +90,7 @@ fn instances(n: usize) {
     let mut random = Random(2);
     // About as many of them along a ray whatever their number.
     let size = 0.5 / (n as f64).cbrt();
+    let before = resident();
     let mut builder = Scene::builder();
     let (placing, ()) = timed(|| {
         for _ in 0..n {
@@ -92,10 +100,11 @@ fn instances(n: usize) {
         }
     });
     let (seconds, scene) = timed(|| builder.build());
+    let bytes = (resident() - before) / n as f64;
     let rays: Vec<Ray> = (0..RAYS).map(|_| Ray::new(2.0 * random.direction(), random.in_cube())).collect();
     let rays: Vec<Ray> = rays.into_iter().map(|r| Ray::new(r.origin, r.direction - r.origin)).collect();
     let (rate, hits) = rate(&rays, |r| scene.intersect(r, Interval::FORWARD).is_some());
-    println!("| {n} | {placing:.3} s | {seconds:.3} s | {rate:.2} ({:.0} % hit) |", 100.0 * hits);
+    println!("| {n} | {placing:.3} s | {seconds:.3} s | {bytes:.0} | {rate:.2} ({:.0} % hit) |", 100.0 * hits);
 }
 
 fn main() {
@@ -106,7 +115,7 @@ fn main() {
     for n in [10_000, 100_000, 1_000_000, 10_000_000].into_iter().filter(|&n| n <= largest) {
         mesh(terrain(n));
     }
-    println!("\n| instances | placing | scene | Mray/s |\n|---|---|---|---|");
+    println!("\n| instances | placing | scene | bytes an instance | Mray/s |\n|---|---|---|---|---|");
     for n in [1000, 10_000, 100_000, 1_000_000].into_iter().filter(|&n| n <= largest / 10) {
         instances(n);
     }
