@@ -11,9 +11,22 @@ pub fn exponent_of(x: f64) -> i32 {
 }
 
 /// x·2^e: exact where the range allows, rounded once where it does not.
+#[inline]
 #[must_use]
 pub fn ldexp(x: f64, e: i32) -> f64 {
-    if x == 0.0 || !x.is_finite() {
+    let own = (x.to_bits() >> 52 & 0x7ff) as i32;
+    let moved = own.saturating_add(e);
+    // A normal number that stays one, as nearly always.
+    if own.wrapping_sub(1).cast_unsigned() < 0x7fe && moved.wrapping_sub(1).cast_unsigned() < 0x7fe {
+        return f64::from_bits(x.to_bits() & !(0x7ff << 52) | (moved as u64) << 52);
+    }
+    if x == 0.0 { x } else { ldexp_anywhere(x, e) }
+}
+
+#[cold]
+#[inline(never)]
+fn ldexp_anywhere(x: f64, e: i32) -> f64 {
+    if !x.is_finite() {
         return x;
     }
     // x = m·2^own, 1 ≤ |m| < 2: a subnormal is lifted first.

@@ -168,10 +168,9 @@ fn surrounds(ray: &Ray, polygon: &Contours) -> Option<bool> {
     if !in_range {
         return None;
     }
-    // Times d_z: the crossing of the ray with the plane through v across the axis.
     let seen = |v: DVec3| {
         let s = v - o;
-        (s[x] * dz - s[z] * dx, s[y] * dz - s[z] * dy)
+        (seen(s[x], s[z], dx, dz), seen(s[y], s[z], dy, dz))
     };
     let mut inside = false;
     let mut start = 0;
@@ -190,11 +189,7 @@ fn surrounds(ray: &Ray, polygon: &Contours) -> Option<bool> {
                 if (ax > bound) & (bx > bound) {
                     inside = !inside;
                 } else if !((ax < -bound) & (bx < -bound)) {
-                    let (p, q) = (ax * by, bx * ay);
-                    let side = p - q;
-                    let off = 1.1 * (bound * ((ax.abs() + ay.abs()) + (bx.abs() + by.abs()) + bound))
-                        + 4.0 * U * (p.abs() + q.abs())
-                        + UNDERFLOW;
+                    let (side, off) = turn([ax, ay], [bx, by], bound);
                     let certain = side.abs() > off;
                     if !certain {
                         return None;
@@ -206,6 +201,23 @@ fn surrounds(ray: &Ray, polygon: &Contours) -> Option<bool> {
         }
     }
     Some(inside)
+}
+
+/// A component of a vertex as the ray sees it, times d_z: where a line along the ray through it crosses the plane across the
+/// axis.
+#[inline(always)]
+fn seen(s: f64, sz: f64, d: f64, dz: f64) -> f64 {
+    s * dz - sz * d
+}
+
+/// The determinant of two vertices, each component off by `bound`, and how far off it is.
+#[inline(always)]
+fn turn([ax, ay]: [f64; 2], [bx, by]: [f64; 2], bound: f64) -> (f64, f64) {
+    let (p, q) = (ax * by, bx * ay);
+    let off = 1.1 * (bound * ((ax.abs() + ay.abs()) + (bx.abs() + by.abs()) + bound))
+        + 4.0 * U * (p.abs() + q.abs())
+        + UNDERFLOW;
+    (p - q, off)
 }
 
 /// Whether the ray passes inside the contours or through one of them, exactly.
@@ -284,4 +296,47 @@ fn refine(ray: &Ray, polygon: &Contours, within: Interval) -> Option<Hit> {
 pub fn precise_lambda(ray: &Ray, polygon: &Contours) -> [f64; 2] {
     let point = polygon.vertices[0];
     ratio::precise(|| plane(ray, point, &polygon.bounded_normal()), || plane(ray, point, &polygon.exact_normal))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::search::{Rational, climb, exact, minus};
+    use super::*;
+
+    #[test]
+    fn no_input_reaches_the_bounds() {
+        // A ray at the middle of an edge, nearly, so that determinants are small.
+        let setting = |x: &[f64]| {
+            let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
+            let (o, a, b) = (v(0), v(3), v(6));
+            let d = a + x[9].abs() * (b - a) - o;
+            (d.z != 0.0).then(|| {
+                let [s, t] = [a - o, b - o];
+                let reach = s.abs().max(t.abs()).max_element();
+                (o, d, [a, b], [s, t], POLYGON_COORDINATE * (reach * d.abs().max_element()))
+            })
+        };
+        let exactly = |o: DVec3, d: DVec3, v: DVec3| {
+            let (s, d) = (minus(v, o), exact(d));
+            [0, 1].map(|i| &s[i] * &d[2] - &s[2] * &d[i])
+        };
+        let rounded = |d: DVec3, s: DVec3| [seen(s.x, s.z, d.x, d.z), seen(s.y, s.z, d.y, d.z)];
+        let off = |rounded: f64, exact: &Rational, bound: f64| {
+            (exact - Rational::try_from(rounded).unwrap()).to_f64().value().abs() / bound
+        };
+        let worst = climb("polygon: coordinates", 10, |x| {
+            let (o, d, vertices, differences, bound) = setting(x)?;
+            let [x, y] = rounded(d, differences[0]);
+            let exact = exactly(o, d, vertices[0]);
+            Some(off(x, &exact[0], bound).max(off(y, &exact[1], bound)))
+        });
+        assert!((0.1..1.0).contains(&worst));
+        let worst = climb("polygon: determinants", 10, |x| {
+            let (o, d, vertices, differences, bound) = setting(x)?;
+            let (value, bound) = turn(rounded(d, differences[0]), rounded(d, differences[1]), bound);
+            let [[ax, ay], [bx, by]] = vertices.map(|v| exactly(o, d, v));
+            Some(off(value, &(ax * by - bx * ay), bound))
+        });
+        assert!((0.03..1.0).contains(&worst));
+    }
 }

@@ -24,6 +24,7 @@ impl Scaled {
     pub const ZERO: Self = Self { hi: 0.0, lo: 0.0, exponent: 0 };
 
     /// (hi + lo)·2^exponent to within 2⁻⁵⁰⁰ of itself; `hi` and `lo` finite, |hi| ≥ |lo|.
+    #[inline]
     #[must_use]
     pub fn new(hi: f64, lo: f64, exponent: i32) -> Self {
         // Away from the ends of the range first, so that the sum is exact.
@@ -32,11 +33,15 @@ impl Scaled {
             h if h < power(-500) => 500,
             _ => 0,
         };
-        let (hi, lo) = two_sum(ldexp(hi, shift), ldexp(lo, shift));
+        let (hi, lo) = if shift == 0 { two_sum(hi, lo) } else { two_sum(ldexp(hi, shift), ldexp(lo, shift)) };
         Self { hi, lo, exponent: exponent - shift }.normalised()
     }
 
+    #[inline]
     fn normalised(self) -> Self {
+        if (1.0..2.0).contains(&self.hi.abs()) {
+            return self;
+        }
         if self.hi == 0.0 {
             return Self::ZERO;
         }

@@ -25,13 +25,12 @@ pub fn intersect(ray: &Ray, min: DVec3, max: DVec3, within: Interval) -> Option<
         // 1/d keeps its digits.
         sound &= (d[i] == 0.0) | ((inverse.abs() < LARGE) & (d[i].abs() < LARGE));
         let (near, far) = if inverse > 0.0 { (min[i], max[i]) } else { (max[i], min[i]) };
-        let (near, far) = ((near - o[i]) * inverse, (far - o[i]) * inverse);
+        let (near, far) = (crossing(near, o[i], inverse), crossing(far, o[i], inverse));
         // 0·∞: the origin on a face that the ray runs along, which is inside. NaN loses both comparisons.
         enter = if near > enter { near } else { enter };
         exit = if far < exit { far } else { exit };
     }
-    // Three roundings each.
-    let (a, b) = (4.0 * U * enter.abs() + UNDERFLOW, 4.0 * U * exit.abs() + UNDERFLOW);
+    let (a, b) = (ROUNDED * enter.abs() + UNDERFLOW, ROUNDED * exit.abs() + UNDERFLOW);
     if sound & (enter + a < exit - b) & (exit - b > within.min) & (enter + a < within.max) & !within.is_empty() {
         return Some((enter, exit));
     }
@@ -39,6 +38,14 @@ pub fn intersect(ray: &Ray, min: DVec3, max: DVec3, within: Interval) -> Option<
         return None;
     }
     decide(ray, min, max, within)
+}
+
+/// A crossing has three roundings: |error| ≤ this·|crossing|.
+const ROUNDED: f64 = 4.0 * U;
+
+#[inline(always)]
+fn crossing(limit: f64, origin: f64, inverse: f64) -> f64 {
+    (limit - origin) * inverse
 }
 
 /// (limit − o)/d on one axis.
@@ -115,4 +122,21 @@ fn decide(ray: &Ray, min: DVec3, max: DVec3, within: Interval) -> Option<(f64, f
         && exit.compare_limit(within.min).is_gt()
         && enter.compare_limit(within.max).is_lt();
     meets.then(|| (enter.lambda(), exit.lambda()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::search::{Rational, climb};
+    use super::*;
+
+    #[test]
+    fn no_input_reaches_the_bound() {
+        let worst = climb("box: crossings", 3, |x| {
+            let [limit, origin, direction] = [x[0], x[1], x[2]].map(|x| Rational::try_from(x).unwrap());
+            let rounded = crossing(x[0], x[1], 1.0 / x[2]);
+            let off = (limit - origin) / direction - Rational::try_from(rounded).ok()?;
+            (rounded != 0.0).then(|| off.to_f64().value().abs() / (ROUNDED * rounded.abs()))
+        });
+        assert!((0.5..1.0).contains(&worst));
+    }
 }

@@ -64,26 +64,31 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
         return None;
     }
     let root = value.sqrt();
+    let (a, b) = (plain_dot(d, d), plain_dot(f.hi, d));
+    let (z, rest) = bounds(f.hi, d, r, root);
     // The root at which the polynomial falls (it is entered), then the one at which it rises.
     for slope in [-1.0, 1.0] {
-        let first = (slope * root - plain_dot(f.hi, d)) / plain_dot(d, d);
-        let (z, rest) = bounds(f.hi, d, r, root);
-        if slope < 0.0 && first + FIRST * z <= within.min {
+        let first = (slope * root - b) / a;
+        if first + FIRST * z <= within.min {
             continue;
         }
-        let (lambda, lo) = step::<P>(&f, d, r, root, slope, first);
-        let error = (lo.abs() + rest) * (1.0 + 8.0 * U);
-        let inside = (lambda - error > within.min) & (lambda + error < within.max);
-        if inside & (rest <= 0.5 * U * lambda.abs()) {
-            return Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 });
+        // `rest` is far above `FIRST`·u·z: then λ is `first` to within a part of it, and known.
+        if rest <= 0.4 * U * first.abs() {
+            let (lambda, lo) = step::<P>(&f, d, r, root, slope, first);
+            let error = (lo.abs() + rest) * (1.0 + 8.0 * U);
+            if (lambda - error > within.min) & (lambda + error < within.max) {
+                return Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 });
+            }
+            if lambda + error < within.min {
+                continue;
+            }
+            if lambda - error > within.max {
+                return None;
+            }
+            return cold();
         }
-        if lambda + error < within.min {
-            continue;
-        }
-        if lambda - error > within.max {
-            return None;
-        }
-        let (lambda, error) = next_to_origin(ray, center.x, center.y, center.z, r, slope);
+        // The ray starts next to the sphere, or grazes it.
+        let (lambda, error) = next_to_origin(ray, center.x, center.y, center.z, r, slope * root, error);
         if lambda + error < within.min {
             continue;
         }
@@ -123,34 +128,43 @@ fn step<P: Product>(f: &Pair, d: DVec3, r: f64, root: f64, slope: f64, first: f6
     two_sum(first, -slope * 0.5 * (1.0 / root) * residual)
 }
 
-/// λ and its error of a root next to the origin, as on a ray that starts on the sphere: C/(|b| + √(b² − AC)) with C and
-/// b in double-double. NaN where it is not, or not known to a part of the least ulp that is promised.
-#[cold]
+/// λ and its error of a root next to the origin, as on a ray that starts on the sphere: C/(|b| + √D) with C in
+/// double-double, and b too if it must be. `root` is ∓√D, D being off by `error`. NaN where λ is not so small, or not known
+/// to a part of the least ulp that is promised.
 #[inline(never)]
-fn next_to_origin(ray: &Ray, x: f64, y: f64, z: f64, r: f64, slope: f64) -> (f64, f64) {
+fn next_to_origin(ray: &Ray, x: f64, y: f64, z: f64, r: f64, root: f64, error: f64) -> (f64, f64) {
     let center = DVec3::new(x, y, z);
     cpu::dispatch(
         #[inline(always)]
-        || small_root::<Fused>(ray, center, r, slope),
+        || small_root::<Fused>(ray, center, r, root, error),
         #[inline(always)]
-        || small_root::<Split>(ray, center, r, slope),
+        || small_root::<Split>(ray, center, r, root, error),
     )
 }
 
 #[inline(always)]
-fn small_root<P: Product>(ray: &Ray, center: DVec3, r: f64, slope: f64) -> (f64, f64) {
+fn small_root<P: Product>(ray: &Ray, center: DVec3, r: f64, root: f64, error: f64) -> (f64, f64) {
     let (f, d) = (Pair::difference(ray.origin, center), ray.direction);
-    let a = plain_dot(d, d);
+    let (a, size) = (plain_dot(d, d), r + taxicab(f.hi));
     let c = f.squared_less::<P>(r, 0.0);
+    let least = 0.5 * U * fine(ray, center.abs().max_element().max(r));
+    // On the sphere b and √D will do as they are.
+    let b = plain_dot(f.hi, d);
+    let over = 1.0 / (b.abs() + root.abs());
+    let lambda = -c * over * root.signum();
+    // How far off b and √D may be, against their sum.
+    let doubt = (4.0 * U * size * taxicab(d) + error / root.abs()) * over;
+    let error = NEAR_C * (r * r + c.abs()) * over + lambda.abs() * (1.25 * doubt + 8.0 * U);
+    if (root * b > 0.0) & (doubt < 0.125) & (error <= least) {
+        return (lambda, error);
+    }
     let (b, b_lo) = f.dot_float::<P>(d);
     let b = b + b_lo;
     let over = 1.0 / (b.abs() + (b * b - a * c).sqrt());
-    let lambda = -slope * c * over;
-    let size = r + taxicab(f.hi);
+    let lambda = -c * over * root.signum();
     let error = NEAR_C * (r * r + c.abs()) * over + lambda.abs() * (16.0 * U + NEAR_B * size * taxicab(d) * over);
-    let near = (slope * b > 0.0) & (4.0 * a * c.abs() < b * b);
-    let sharp = error <= 0.5 * U * fine(ray, center.abs().max_element().max(r));
-    if near & sharp { (lambda, error) } else { (f64::NAN, f64::NAN) }
+    let near = (root * b > 0.0) & (4.0 * a * c.abs() < b * b);
+    if near & (error <= least) { (lambda, error) } else { (f64::NAN, f64::NAN) }
 }
 
 /// Scalars, so that the caller's vectors stay in registers.

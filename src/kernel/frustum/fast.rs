@@ -1,57 +1,16 @@
-//! Ray and frustum of a cone, with its caps: cylinder, cone and truncated cone are one solid.
+//! The fast path: the signs that tell where a line enters and leaves, each with a bound, then one Newton step.
 //!
-//! With v = top − base, x = p − base and t = x·v the body is {0 ≤ t ≤ |v|², |v|²·|x × v|² ≤ (r₀|v|² + Δr·t)²}: a
-//! polynomial in the inputs, without the axis's length. Which of its ends a line meets on a cap and which on the wall
-//! is told by signs alone, before any λ is known; docs/numerics.md §6.
+//! docs/numerics.md §6 derives every constant.
 
-use super::bound::{U, UNDERFLOW};
-use super::cpu;
-use super::eft::{Fused, Product, Split, two_diff, two_sum};
-use super::number::{Number, Vector, cross, difference, dot, vector};
-use super::pair::{Pair, in_range, plain_cross, plain_dot, taxicab};
-use super::section::{End, Quadratic, Undecided, fine, nearest, precise, refined, sign};
+use super::{BASE, TOP, WALL, refine};
 use crate::hit::Hit;
 use crate::interval::Interval;
+use crate::kernel::bound::{U, UNDERFLOW};
+use crate::kernel::eft::{Product, two_diff, two_sum};
+use crate::kernel::float::power;
+use crate::kernel::pair::{Pair, in_range, plain_cross, plain_dot, taxicab};
 use crate::ray::Ray;
 use glam::{DVec2, DVec3};
-use std::cmp::Ordering;
-
-/// [`Hit::part`] on the wall, and at an apex.
-pub const WALL: u32 = 0;
-/// [`Hit::part`] on the base cap, its rim included.
-pub const BASE: u32 = 1;
-/// [`Hit::part`] on the top cap, its rim included.
-pub const TOP: u32 = 2;
-
-/// The nearest hit of `ray` with the capped frustum from `base` with `base_radius` to `top` with `top_radius` inside
-/// `within`; equal radii make a cylinder, one zero radius a cone.
-///
-/// The body is closed and convex: a line meets it from where it enters to where it leaves, and the hits are these two
-/// points, or one where they coincide (tangent, rim, apex). This also settles lines in a cap's plane, along the wall
-/// and through the apex. All of it is decided as exact arithmetic on these numbers would. λ is within 4 ulp of the
-/// exact λ (an ulp of 2⁻⁴⁰ of the largest coordinate over |direction| if that is larger), and `error` bounds what it is
-/// off. `part` is [`WALL`], [`BASE`] or [`TOP`]: a rim belongs to its cap (but to the wall for a ray in the cap's plane),
-/// an apex to the wall.
-///
-/// A ray that is not [valid](Ray::is_valid) misses, and so does everything if the solid is none: a number that is not
-/// finite, equal points, a negative radius or both zero.
-#[must_use]
-#[inline]
-pub fn intersect(
-    ray: &Ray,
-    base: DVec3,
-    top: DVec3,
-    base_radius: f64,
-    top_radius: f64,
-    within: Interval,
-) -> Option<Hit> {
-    cpu::dispatch(
-        #[inline(always)]
-        || fast::<Fused>(ray, base, top, base_radius, top_radius, within),
-        #[inline(always)]
-        || fast::<Split>(ray, base, top, base_radius, top_radius, within),
-    )
-}
 
 // Bounds of the signs' errors, with |·|₁ lengths d, v, x, size = x + v + r₀ + r₁, X = d·v·size, Y = (v + |Δr|)·X.
 /// d·v: this·d·v.
@@ -83,7 +42,14 @@ struct Solved {
 
 /// The same bits for either [`Product`].
 #[inline(always)]
-fn fast<P: Product>(ray: &Ray, base: DVec3, top: DVec3, r0: f64, r1: f64, within: Interval) -> Option<Hit> {
+pub(super) fn intersect<P: Product>(
+    ray: &Ray,
+    base: DVec3,
+    top: DVec3,
+    r0: f64,
+    r1: f64,
+    within: Interval,
+) -> Option<Hit> {
     let (o, d) = (ray.origin, ray.direction);
     let cold = || refine(ray, &base, &top, r0, r1, within.min, within.max);
     let (x, y, v) = (Pair::difference(o, base), Pair::difference(o, top), Pair::difference(top, base));
@@ -100,11 +66,12 @@ fn fast<P: Product>(ray: &Ray, base: DVec3, top: DVec3, r0: f64, r1: f64, within
     // NaN fails every one of these.
     let ordinary = in_range(dl, 100) & in_range(vl, 100) & (size < TOO_LARGE) & (r0 >= 0.0) & (r1 >= 0.0);
     let told = (at_base.abs() > base_error) & (at_top.abs() > top_error) & (rate.abs() > RATE * dl * vl);
-    if !(ordinary & told) {
+    let across = rate == 0.0 && ordinary && is_across::<P>(d, &v);
+    if !(ordinary & (told | across)) {
         return cold();
     }
     let h2 = plain_dot(v.hi, v.hi);
-    let on_wall = (at_base < 0.0) & (at_top < 0.0);
+    let on_wall = !across & (at_base < 0.0) & (at_top < 0.0);
     let slope = growth * rate;
     let [(leading, leading_error), (discriminant, discriminant_error)] =
         wall_signs(w, n, v.hi, r0, growth, rate, dl * vl, scale);
@@ -122,6 +89,17 @@ fn fast<P: Product>(ray: &Ray, base: DVec3, top: DVec3, r0: f64, r1: f64, within
             & (from_base < -turn_error)
             & (from_top > turn_error);
         if !hits {
+            return cold();
+        }
+    }
+    if across {
+        // A chord of one circle: between the caps' planes, and near enough to the axis.
+        let (above, below) = (plain_dot(x.hi, v.hi), plain_dot(y.hi, v.hi));
+        let error = HEIGHT * vl * (size + taxicab(y.hi));
+        if (above < -error) | (below > error) | (discriminant < -discriminant_error) {
+            return None;
+        }
+        if !((above > error) & (below < -error) & (discriminant > discriminant_error)) {
             return cold();
         }
     }
@@ -145,7 +123,7 @@ fn fast<P: Product>(ray: &Ray, base: DVec3, top: DVec3, r0: f64, r1: f64, within
     let forward = rate > 0.0;
     let (first, last) = if forward { ((at_base, BASE), (at_top, TOP)) } else { ((at_top, TOP), (at_base, BASE)) };
     for ((crossing, part), turn) in [(first, -1.0), (last, 1.0)] {
-        let on_cap = crossing > 0.0;
+        let on_cap = !across & (crossing > 0.0);
         let Solved { lambda, lo, rest } = if on_cap { plane(if part == BASE { &x } else { &y }) } else { wall(turn) };
         let error = (lo.abs() + rest) * (1.0 + 8.0 * U);
         if lambda + error < within.min {
@@ -164,6 +142,24 @@ fn fast<P: Product>(ray: &Ray, base: DVec3, top: DVec3, r0: f64, r1: f64, within
     }
     None
 }
+
+/// Whether d·v is zero, exactly, as it is where both lie along axes. May say no where it is.
+#[cold]
+#[inline(never)]
+fn is_across<P: Product>(d: DVec3, v: &Pair) -> bool {
+    let product = |a: f64, b: f64| {
+        let (p, p_lo) = P::two_product(a, b);
+        // Nothing is lost below the range.
+        ((p.abs() > SMALL) | (a == 0.0) | (b == 0.0), p, p_lo)
+    };
+    let products = [product(d.x, v.hi.x), product(d.y, v.hi.y), product(d.z, v.hi.z)];
+    let [(_, x, _), (_, y, _), (_, z, _)] = products;
+    let (xy, rounding) = two_sum(x, y);
+    v.lo == DVec3::ZERO && products.iter().all(|p| p.0 && p.2 == 0.0) && rounding == 0.0 && xy + z == 0.0
+}
+
+/// The rounding error of a product above this is a float.
+const SMALL: f64 = power(-900);
 
 /// r²(d·v)² − |w × v|² and a bound on its error: whether the line with that moment about a cap's centre crosses the
 /// cap's plane inside its circle.
@@ -203,6 +199,8 @@ fn turns(w: DVec3, n: DVec3, v: DVec3, r: [f64; 2], growth: f64, rate: f64, dl: 
     [turn(w, r[0]), turn(w + n, r[1])]
 }
 
+/// (from a cap's centre)·v: this·v·(that one's distance + size).
+const HEIGHT: f64 = 8.0 * U;
 /// Lengths stay below this, so that forms of degree eight do not overflow.
 const TOO_LARGE: f64 = (1u128 << 100) as f64;
 
@@ -267,212 +265,17 @@ fn wall_step<P: Product>(
     Solved { lambda, lo, rest: if proved { rest } else { f64::NAN } }
 }
 
-/// By references and scalars, so that the caller's vectors stay in registers.
-#[cold]
-#[inline(never)]
-fn refine(ray: &Ray, base: &DVec3, top: &DVec3, r0: f64, r1: f64, min: f64, max: f64) -> Option<Hit> {
-    #[cfg(test)]
-    tests::COLD.with(|n| n.set(n.get() + 1));
-    let within = Interval { min, max };
-    let solid = Solid { base: *base, top: *top, base_radius: r0, top_radius: r1 };
-    if !ray.is_valid() || !solid.is_valid() || within.is_empty() {
-        return None;
-    }
-    refined!(decide(ray, &solid, within)).unwrap_or(None)
-}
-
-/// Where `point` is: `Less` inside, `Equal` on the surface, `Greater` outside; exactly. Finite input.
-#[must_use]
-pub fn side(point: DVec3, base: DVec3, top: DVec3, base_radius: f64, top_radius: f64) -> Ordering {
-    let solid = Solid { base, top, base_radius, top_radius };
-    refined!(locate(point, &solid)).unwrap_or(Ordering::Greater)
-}
-
-/// λ of the hit at about `lambda`, to a hundred bits, as an unevaluated sum.
-#[must_use]
-pub fn precise_lambda(ray: &Ray, base: DVec3, top: DVec3, base_radius: f64, top_radius: f64, lambda: f64) -> [f64; 2] {
-    let solid = Solid { base, top, base_radius, top_radius };
-    if !ray.is_valid() || !solid.is_valid() {
-        return [lambda, 0.0];
-    }
-    refined!(sharpen(ray, &solid, lambda)).unwrap_or([lambda, 0.0])
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Solid {
-    base: DVec3,
-    top: DVec3,
-    base_radius: f64,
-    top_radius: f64,
-}
-
-impl Solid {
-    /// The largest coordinate or radius.
-    fn extent(&self) -> f64 {
-        self.base.abs().max(self.top.abs()).max_element().max(self.base_radius).max(self.top_radius)
-    }
-
-    fn is_valid(&self) -> bool {
-        let Self { base, top, base_radius: r0, top_radius: r1 } = *self;
-        base.is_finite()
-            && top.is_finite()
-            && base != top
-            && r0 >= 0.0
-            && r1 >= 0.0
-            && r0.is_finite()
-            && r1.is_finite()
-            && (r0 > 0.0 || r1 > 0.0)
-    }
-}
-
-/// The line in the solid's terms: p(λ) = origin + λd; x and y are the origin from base and top.
-struct Line<N> {
-    d: Vector<N>,
-    v: Vector<N>,
-    x: Vector<N>,
-    y: Vector<N>,
-    /// d·v
-    rate: N,
-    /// |v|²
-    h2: N,
-    r0: N,
-    r1: N,
-}
-
-impl<N: Number> Line<N> {
-    #[inline(always)]
-    fn new(ray: &Ray, solid: &Solid) -> Self {
-        let v = difference::<N>(solid.top, solid.base);
-        let d = vector::<N>(ray.direction);
-        Self {
-            x: difference(ray.origin, solid.base),
-            y: difference(ray.origin, solid.top),
-            rate: dot(&d, &v),
-            h2: dot(&v, &v),
-            r0: N::exactly(solid.base_radius),
-            r1: N::exactly(solid.top_radius),
-            d,
-            v,
-        }
-    }
-
-    /// Whether the line crosses a cap's plane inside its circle (`Greater`), on it, or outside: with w the moment
-    /// (from the cap's centre) × d, the sign of r²(d·v)² − |w × v|².
-    #[inline(always)]
-    fn crossing(&self, moment: &Vector<N>, r: &N) -> Result<Ordering, Undecided> {
-        let across = cross(moment, &self.v);
-        sign(&r.times(&self.rate).squared().minus(&dot(&across, &across)))
-    }
-
-    /// The wall: h²|(x + λd) × v|² − (r₀h² + Δr·t)², its discriminant in Lagrange's form, which grows with the moment
-    /// x × d only: h⁴·(h²|r₀ d×v − Δr x×d|² − (h² + Δr²)(v·(x×d))²).
-    #[inline(always)]
-    fn wall(&self, moment: &Vector<N>, n: &Vector<N>, growth: &N) -> Quadratic<N> {
-        let Self { v, x, h2, r0, rate, .. } = self;
-        let m = cross(x, v);
-        let radius = r0.times(h2).plus(&growth.times(&dot(x, v)));
-        let slope = growth.times(rate);
-        let a = h2.times(&dot(n, n)).minus(&slope.squared());
-        let b = h2.times(&dot(&m, n)).minus(&radius.times(&slope));
-        let c = h2.times(&dot(&m, &m)).minus(&radius.squared());
-        let g = combined(r0, n, &growth.negated(), moment);
-        let spread = h2.times(&dot(&g, &g));
-        let offset = h2.plus(&growth.squared()).times(&dot(v, moment).squared());
-        Quadratic { a, b, c, discriminant: h2.squared().times(&spread.minus(&offset)) }
-    }
-}
-
-/// s·a + t·b
-#[inline(always)]
-fn combined<N: Number>(s: &N, a: &Vector<N>, t: &N, b: &Vector<N>) -> Vector<N> {
-    [s.times(&a[0]).plus(&t.times(&b[0])), s.times(&a[1]).plus(&t.times(&b[1])), s.times(&a[2]).plus(&t.times(&b[2]))]
-}
-
-/// Finds the two ends of the line's section of the solid, and answers what is asked of them.
-#[inline(always)]
-fn with_section<N: Number, R>(
-    ray: &Ray,
-    solid: &Solid,
-    miss: R,
-    answer: impl FnOnce([(End<N>, u32); 2]) -> Result<R, Undecided>,
-) -> Result<R, Undecided> {
-    let line = Line::<N>::new(ray, solid);
-    let Line { d, v, x, y, rate, .. } = &line;
-    let growth = N::difference(solid.top_radius, solid.base_radius);
-    let moment = cross(x, d);
-    let n = cross(d, v);
-    let along = sign(rate)?;
-    if along.is_eq() {
-        // Perpendicular to the axis: a chord of one circle.
-        if sign(&dot(x, v))?.is_lt() || sign(&dot(y, v))?.is_gt() {
-            return Ok(miss);
-        }
-        let wall = line.wall(&moment, &n, &growth);
-        if sign(&wall.discriminant)?.is_lt() {
-            return Ok(miss);
-        }
-        return answer([(End::Falling(&wall), WALL), (End::Rising(&wall), WALL)]);
-    }
-    let top_moment = [moment[0].plus(&n[0]), moment[1].plus(&n[1]), moment[2].plus(&n[2])];
-    let at_base = line.crossing(&moment, &line.r0)?;
-    let at_top = line.crossing(&top_moment, &line.r1)?;
-    let wall = line.wall(&moment, &n, &growth);
-    if at_base.is_lt() && at_top.is_lt() {
-        // Outside in both planes: it must dip into the wall between them, where the polynomial is convex, falls at the
-        // plane it comes from and rises at the other.
-        if sign(&wall.a)?.is_le() || sign(&wall.discriminant)?.is_lt() {
-            return Ok(miss);
-        }
-        let turn = |w: &Vector<N>, r: &N| line.h2.times(&dot(&n, w)).minus(&growth.times(r).times(&rate.squared()));
-        if sign(&turn(&moment, &line.r0))?.is_ge() || sign(&turn(&top_moment, &line.r1))?.is_le() {
-            return Ok(miss);
-        }
-        return answer([(End::Falling(&wall), WALL), (End::Rising(&wall), WALL)]);
-    }
-    let cap = |crossing: Ordering, from: &Vector<N>, part: u32| {
-        crossing.is_ge().then(|| (End::Plane { value: dot(from, v), rate }, part))
-    };
-    let base = cap(at_base, x, if solid.base_radius > 0.0 { BASE } else { WALL });
-    let top = cap(at_top, y, if solid.top_radius > 0.0 { TOP } else { WALL });
-    let (first, last) = if along.is_gt() { (base, top) } else { (top, base) };
-    answer([first.unwrap_or((End::Falling(&wall), WALL)), last.unwrap_or((End::Rising(&wall), WALL))])
-}
-
-#[inline(always)]
-fn decide<N: Number>(ray: &Ray, solid: &Solid, within: Interval) -> Result<Option<Hit>, Undecided> {
-    let fine = fine(ray, solid.extent());
-    with_section::<N, _>(ray, solid, None, |ends| nearest(ends, within, fine))
-}
-
-#[inline(always)]
-fn sharpen<N: Number>(ray: &Ray, solid: &Solid, lambda: f64) -> Result<[f64; 2], Undecided> {
-    with_section::<N, _>(ray, solid, [lambda, 0.0], |[(enter, _), (exit, _)]| precise(&[enter, exit], lambda))
-}
-
-#[inline(always)]
-fn locate<N: Number>(point: DVec3, solid: &Solid) -> Result<Ordering, Undecided> {
-    let v = difference::<N>(solid.top, solid.base);
-    let (x, y) = (difference::<N>(point, solid.base), difference::<N>(point, solid.top));
-    let (t, from_top, h2) = (dot(&x, &v), dot(&y, &v), dot(&v, &v));
-    let growth = N::difference(solid.top_radius, solid.base_radius);
-    let radius = N::exactly(solid.base_radius).times(&h2).plus(&growth.times(&t));
-    let m = cross(&x, &v);
-    let below = sign(&t)?.reverse();
-    let above = sign(&from_top)?;
-    let beside = sign(&h2.times(&dot(&m, &m)).minus(&radius.squared()))?;
-    // Outside one is outside; else on one is on it.
-    Ok(below.max(above).max(beside))
-}
-
 #[cfg(test)]
-mod tests {
-    use super::super::search::{Rational, climb, cross3, dot3, each, exact, minus};
+pub(super) mod tests {
+    use super::super::super::search::{Rational, climb, cross3, dot3, each, exact, minus};
+    use super::super::{Solid, intersect as answer};
     use super::*;
+    use crate::kernel::eft::{Fused, Split};
     use std::cell::Cell;
 
     thread_local! {
         /// How often the cold path was taken.
-        pub(super) static COLD: Cell<usize> = const { Cell::new(0) };
+        pub(in super::super) static COLD: Cell<usize> = const { Cell::new(0) };
     }
 
     /// Base, top, radii and a ray from near or far, with few relations or near-ties between them.
@@ -643,8 +446,7 @@ mod tests {
             let target = base + x[14].abs() * axis + 0.4 * v(6) * size;
             let ray = Ray { origin: target - u * size * (6.0 + 4.0 * x[15]), direction: u };
             cases += 1;
-            hits +=
-                usize::from(intersect(&ray, base, base + axis, base_radius, top_radius, Interval::FORWARD).is_some());
+            hits += usize::from(answer(&ray, base, base + axis, base_radius, top_radius, Interval::FORWARD).is_some());
         });
         let cold = COLD.get();
         println!("frustum: {cold} of {cases} ordinary rays, {hits} hits");
@@ -658,8 +460,8 @@ mod tests {
             let (ray, s) = setting(t);
             let within = Interval::FORWARD;
             let answers = [
-                fast::<Fused>(&ray, s.base, s.top, s.base_radius, s.top_radius, within),
-                fast::<Split>(&ray, s.base, s.top, s.base_radius, s.top_radius, within),
+                intersect::<Fused>(&ray, s.base, s.top, s.base_radius, s.top_radius, within),
+                intersect::<Split>(&ray, s.base, s.top, s.base_radius, s.top_radius, within),
             ];
             assert_eq!(answers[0], answers[1]);
             seen[usize::from(answers[0].is_some())] += 1;
