@@ -6,6 +6,7 @@
 //! point of the ray is skipped (docs/numerics.md §10).
 
 mod build;
+mod bundle;
 mod collapse;
 mod frame;
 mod level;
@@ -21,11 +22,12 @@ mod wide;
 
 pub use level::Level;
 
+pub(crate) use bundle::{Bundle, Eight, RAYS};
 pub(crate) use collapse::build;
 pub(crate) use frame::Frame;
-pub(crate) use slab::LocalRay;
+pub(crate) use slab::{Limits, LocalRay, PLAIN_ERROR};
 pub(crate) use tasks::map;
-pub(crate) use traverse::{Any, Closest, any, closest};
+pub(crate) use traverse::{Any, Closest, Lanes, any, closest};
 pub(crate) use watch::Watch;
 pub(crate) use wide::Wide;
 
@@ -104,7 +106,7 @@ impl Bvh {
     fn closest_with<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, visit: &mut impl FnMut(u32, f64) -> f64) {
         let mut bound = within.max;
         if let Some(local) = LocalRay::new(simd, &self.tree.frame, ray, within) {
-            closest(simd, &self.tree, &local, &mut Nearest { bvh: self, local: &local, bound, visit });
+            closest(simd, &self.tree, &Lanes::new(simd, &local), local.t_max, &mut Nearest { bvh: self, local: &local, bound, visit });
         } else if !within.is_empty() && ray.is_valid() {
             // No place in the frame: every object.
             for &object in &self.objects {
@@ -122,7 +124,7 @@ impl Bvh {
     #[inline(always)]
     fn any_with<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, hits: &mut impl FnMut(u32) -> bool) -> bool {
         if let Some(local) = LocalRay::new(simd, &self.tree.frame, ray, within) {
-            any(simd, &self.tree, &local, &mut First { bvh: self, hits })
+            any(simd, &self.tree, &Lanes::new(simd, &local), local.t_max, &mut First { bvh: self, hits })
         } else {
             !within.is_empty() && ray.is_valid() && self.objects.iter().any(|&o| hits(o))
         }
@@ -154,9 +156,9 @@ struct Nearest<'a, F> {
     visit: F,
 }
 
-impl<F: FnMut(u32, f64) -> f64> Closest for Nearest<'_, F> {
+impl<S: Simd, F: FnMut(u32, f64) -> f64> Closest<S> for Nearest<'_, F> {
     #[inline(always)]
-    fn leaf<S: Simd>(&mut self, _: S, leaf: u32) -> f32 {
+    fn leaf(&mut self, _: S, leaf: u32) -> f32 {
         for &object in self.bvh.leaf(leaf) {
             self.bound = (self.visit)(object, self.bound);
         }
@@ -169,9 +171,9 @@ struct First<'a, F> {
     hits: F,
 }
 
-impl<F: FnMut(u32) -> bool> Any for First<'_, F> {
+impl<S: Simd, F: FnMut(u32) -> bool> Any<S> for First<'_, F> {
     #[inline(always)]
-    fn leaf<S: Simd>(&mut self, _: S, leaf: u32) -> bool {
+    fn leaf(&mut self, _: S, leaf: u32) -> bool {
         self.bvh.leaf(leaf).iter().any(|&object| (self.hits)(object))
     }
 }

@@ -79,17 +79,18 @@ impl Stack {
 }
 
 #[inline(always)]
-fn row<S: Simd>(simd: S, node: &WideNode, row: u32) -> f32x8<S> {
-    node.rows[row as usize & 7].simd_into(simd)
-}
-
-#[inline(always)]
 fn spread<S: Simd>(simd: S, v: &[f32; 4]) -> [f32x8<S>; 3] {
     [f32x8::splat(simd, v[0]), f32x8::splat(simd, v[1]), f32x8::splat(simd, v[2])]
 }
 
+/// What is walked with: a ray, or many.
+pub(crate) trait Beam<S: Simd> {
+    /// Which of the node's boxes may be met before `t_max`, and from which t on.
+    fn test(&self, simd: S, node: &WideNode, t_max: f32) -> (u32, f32x8<S>);
+}
+
 /// The ray's constants in every lane.
-struct Lanes<S: Simd> {
+pub(crate) struct Lanes<S: Simd> {
     inv: [f32x8<S>; 3],
     near_shift: [f32x8<S>; 3],
     far_shift: [f32x8<S>; 3],
@@ -100,7 +101,7 @@ struct Lanes<S: Simd> {
 
 impl<S: Simd> Lanes<S> {
     #[inline(always)]
-    fn new(simd: S, ray: &LocalRay) -> Self {
+    pub(crate) fn new(simd: S, ray: &LocalRay) -> Self {
         Self {
             inv: spread(simd, &ray.inv),
             near_shift: spread(simd, &ray.near_shift),
@@ -110,13 +111,15 @@ impl<S: Simd> Lanes<S> {
         }
     }
 
-    /// Which of the node's boxes the ray may meet before `t_max`, and from which t on.
+}
+
+impl<S: Simd> Beam<S> for Lanes<S> {
     #[inline(always)]
     fn test(&self, simd: S, node: &WideNode, t_max: f32) -> (u32, f32x8<S>) {
         let [inv, near, far] = [&self.inv, &self.near_shift, &self.far_shift];
-        let (near_x, far_x) = (row(simd, node, self.near[0]), row(simd, node, self.near[0] ^ 1));
-        let (near_y, far_y) = (row(simd, node, self.near[1]), row(simd, node, self.near[1] ^ 1));
-        let (near_z, far_z) = (row(simd, node, self.near[2]), row(simd, node, self.near[2] ^ 1));
+        let (near_x, far_x) = (node.row(simd, self.near[0]), node.row(simd, self.near[0] ^ 1));
+        let (near_y, far_y) = (node.row(simd, self.near[1]), node.row(simd, self.near[1] ^ 1));
+        let (near_z, far_z) = (node.row(simd, self.near[2]), node.row(simd, self.near[2] ^ 1));
         let enter_x = near_x.mul_add(inv[0], near[0]);
         let enter_y = near_y.mul_add(inv[1], near[1]);
         let enter_z = near_z.mul_add(inv[2], near[2]);
@@ -132,30 +135,28 @@ impl<S: Simd> Lanes<S> {
 }
 
 /// What is done at the leaves on the way to the nearest hit.
-pub(crate) trait Closest {
+pub(crate) trait Closest<S: Simd> {
     /// Tests what leaf `leaf` holds and returns the t from which on nothing matters any more.
-    fn leaf<S: Simd>(&mut self, simd: S, leaf: u32) -> f32;
+    fn leaf(&mut self, simd: S, leaf: u32) -> f32;
 }
 
 /// What is done at the leaves on the way to any hit.
-pub(crate) trait Any {
+pub(crate) trait Any<S: Simd> {
     /// Whether leaf `leaf` holds a hit.
-    fn leaf<S: Simd>(&mut self, simd: S, leaf: u32) -> bool;
+    fn leaf(&mut self, simd: S, leaf: u32) -> bool;
 }
 
-/// Visits the leaves whose boxes the ray meets, nearest first.
+/// Visits the leaves whose boxes `beam` meets before `t_max`, nearest first.
 #[inline(always)]
-pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut impl Closest) {
-    let lanes = Lanes::new(simd, ray);
+pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, beam: &impl Beam<S>, mut t_max: f32, leaves: &mut impl Closest<S>) {
     let nodes = &tree.nodes[..];
-    let mut t_max = ray.t_max;
     let mut stack = Stack::new();
     let mut at = 0u32;
     loop {
         // Down to a leaf, or to nothing.
         while at & LEAF == 0 {
             let node = &nodes[at as usize];
-            let (mut hits, enter) = lanes.test(simd, node, t_max);
+            let (mut hits, enter) = beam.test(simd, node, t_max);
             if hits == 0 {
                 at = NONE;
                 break;
@@ -202,17 +203,16 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mu
     }
 }
 
-/// Visits the leaves whose boxes the ray meets, in the nodes' fixed order, until one holds a hit.
+/// Visits the leaves whose boxes `beam` meets before `t_max`, in the nodes' fixed order, until one holds a hit.
 #[inline(always)]
-pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, ray: &LocalRay, leaves: &mut impl Any) -> bool {
-    let lanes = Lanes::new(simd, ray);
+pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, beam: &impl Beam<S>, t_max: f32, leaves: &mut impl Any<S>) -> bool {
     let nodes = &tree.nodes[..];
     let mut stack = Stack::new();
     let mut at = 0u32;
     loop {
         while at & LEAF == 0 {
             let node = &nodes[at as usize];
-            let (mut hits, _) = lanes.test(simd, node, ray.t_max);
+            let (mut hits, _) = beam.test(simd, node, t_max);
             if hits == 0 {
                 at = NONE;
                 break;

@@ -1,6 +1,7 @@
 //! Nodes of eight children.
 
 use super::frame::Frame;
+use fearless_simd::{Simd, f32x8, prelude::*};
 
 /// Eight children, 256 bytes, four cache lines.
 ///
@@ -24,6 +25,12 @@ impl WideNode {
         let (out, back) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
         Self { rows: [out, back, out, back, out, back, [f32::from_bits(NONE); 8], [0.0; 8]] }
     };
+
+    /// See [`rows`](Self::rows).
+    #[inline(always)]
+    pub(crate) fn row<S: Simd>(&self, simd: S, row: u32) -> f32x8<S> {
+        self.rows[row as usize & 7].simd_into(simd)
+    }
 
     #[inline(always)]
     pub(crate) fn child(&self, lane: usize) -> u32 {

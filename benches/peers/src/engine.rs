@@ -19,13 +19,19 @@ pub struct RaySet {
     /// Neighbours in the slice are neighbours in the picture.
     pub coherent: bool,
     pub rays: Vec<Ray>,
-    pub double: Vec<truehit::Ray>,
+    pub double: Vec<(truehit::Ray, truehit::Interval)>,
 }
 
 impl RaySet {
     pub fn new(name: &'static str, any_hit: bool, coherent: bool, rays: Vec<Ray>) -> Self {
         let widen = |v: [f32; 3]| v.map(f64::from);
-        let double = rays.iter().map(|r| truehit::Ray::new(widen(r.origin), widen(r.direction))).collect();
+        let double = rays
+            .iter()
+            .map(|r| {
+                let ray = truehit::Ray::new(widen(r.origin), widen(r.direction));
+                (ray, truehit::Interval::new(0.0, r.max.into()))
+            })
+            .collect();
         Self { name, any_hit, coherent, rays, double }
     }
 }

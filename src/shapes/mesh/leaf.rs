@@ -6,7 +6,7 @@
 
 use super::Mesh;
 use crate::Aabb;
-use crate::bvh::{self, Frame, LocalRay, Wide};
+use crate::bvh::{self, Bundle, Frame, LocalRay, Wide};
 use fearless_simd::{Simd, f32x8, prelude::*};
 use glam::DVec3;
 
@@ -115,18 +115,35 @@ pub(super) fn build(
 /// The ray as the filter wants it: in f32, with the margins' constants.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probe {
-    origin: [f32; 4],
-    direction: [f32; 4],
-    /// Margin of the edge functions: size·(`edge` + size·`edge2`).
-    edge: f32,
-    edge2: f32,
-    /// Margin of t's numerator against its denominator: size²·`depth`.
-    depth: f32,
+    pub(super) origin: [f32; 4],
+    pub(super) direction: [f32; 4],
+    pub(super) margins: Margins,
     pub(super) t_min: f32,
     /// No hit has a t above this in absolute value.
     reach: f32,
     /// Leaves hold vertices, not edges.
     exact: bool,
+}
+
+/// What the filter's quantities may be off by.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Margins {
+    /// Of the edge functions: size·(`edge` + size·`edge2`).
+    edge: f32,
+    edge2: f32,
+    /// Of t's numerator against its denominator: size²·`depth`.
+    depth: f32,
+}
+
+impl Margins {
+    /// Enough for both.
+    pub(super) fn max(self, other: Self) -> Self {
+        Self {
+            edge: self.edge.max(other.edge),
+            edge2: self.edge2.max(other.edge2),
+            depth: self.depth.max(other.depth),
+        }
+    }
 }
 
 /// The unit roundoff of f32, 2⁻²⁴.
@@ -144,9 +161,7 @@ impl Probe {
         Self {
             origin: ray.origin,
             direction: ray.direction,
-            edge: 13.0 * E * d * r,
-            edge2: 3.1 * E * d,
-            depth: 6.2 * E * r,
+            margins: Margins { edge: 13.0 * E * d * r, edge2: 3.1 * E * d, depth: 6.2 * E * r },
             t_min: if ray.t_min > -reach { ray.t_min } else { -reach },
             reach,
             exact,
@@ -155,50 +170,149 @@ impl Probe {
 
     /// The later end of what matters: `t_max`, but no farther than any triangle.
     #[inline(always)]
-    fn last(&self, t_max: f32) -> f32 {
+    pub(super) fn last(&self, t_max: f32) -> f32 {
         if t_max < self.reach { t_max } else { self.reach }
     }
 
     /// Which triangles of `leaf` may be met between `t_min` and `t_max`, and what is known of them; `None` if none.
     #[inline(always)]
     pub(super) fn test<S: Simd>(&self, simd: S, leaf: &Leaf, t_max: f32) -> Option<Outcome> {
-        let (v0, v1, v2) = (load(simd, &leaf.v0), load(simd, &leaf.v1), load(simd, &leaf.v2));
+        let triangles = leaf.triangles(simd, self.exact);
         let (o, d) = (spread(simd, &self.origin), spread(simd, &self.direction));
-        let size: f32x8<S> = leaf.size.simd_into(simd);
+        let (t_min, last) = (splat(simd, self.t_min), splat(simd, self.last(t_max)));
+        filter(simd, &triangles, [o, d], &self.margins, [t_min, last])
+    }
+}
 
-        let (e1, e2) = if self.exact { (minus(v1, v0), minus(v2, v0)) } else { (v1, v2) };
-        let c = minus(v0, o);
-        let r = cross(c, d);
+/// v₀, e₁, e₂ and the size of the triangle of each lane.
+pub(super) struct Triangles<S: Simd> {
+    v0: Vec8<S>,
+    e1: Vec8<S>,
+    e2: Vec8<S>,
+    size: f32x8<S>,
+}
+
+impl Leaf {
+    /// The leaf's triangles.
+    #[inline(always)]
+    pub(super) fn triangles<S: Simd>(&self, simd: S, exact: bool) -> Triangles<S> {
+        let (v0, v1, v2) = (load(simd, &self.v0), load(simd, &self.v1), load(simd, &self.v2));
+        let (e1, e2) = if exact { (minus(v1, v0), minus(v2, v0)) } else { (v1, v2) };
+        Triangles { v0, e1, e2, size: self.size.simd_into(simd) }
+    }
+
+    /// One triangle, in every lane.
+    #[inline(always)]
+    pub(super) fn triangle<S: Simd>(&self, simd: S, lane: usize, exact: bool) -> Triangles<S> {
+        let everywhere = |rows: &[[f32; 8]; 3]| [0, 1, 2].map(|i| splat(simd, rows[i][lane & 7]));
+        let (v0, v1, v2) = (everywhere(&self.v0), everywhere(&self.v1), everywhere(&self.v2));
+        let (e1, e2) = if exact { (minus(v1, v0), minus(v2, v0)) } else { (v1, v2) };
+        Triangles { v0, e1, e2, size: splat(simd, self.size[lane & 7]) }
+    }
+}
+
+/// Eight tests, of a ray and a triangle each, for t between `t_min` and `last`; `None` if all are certain misses.
+#[inline(always)]
+pub(super) fn filter<S: Simd>(
+    simd: S,
+    triangles: &Triangles<S>,
+    [o, d]: [Vec8<S>; 2],
+    margins: &Margins,
+    [t_min, last]: [f32x8<S>; 2],
+) -> Option<Outcome> {
+    let &Triangles { v0, e1, e2, size } = triangles;
+    let c = minus(v0, o);
+    let r = cross(c, d);
+    let n = cross(e1, e2);
+    let det = dot(n, d);
+    let u = dot(r, e2);
+    let v = -dot(r, e1);
+    let w = det - u - v;
+    let margin = margins.edges(simd, size);
+    // Certainly a miss: one edge function above zero, another below. An empty lane has a negative margin.
+    let least = u.min(v.min(w));
+    let most = u.max(v.max(w));
+    let outside = (least.simd_lt(-margin) & most.simd_gt(margin)).to_bitmask() as u32;
+    if outside == 0xff {
+        return None;
+    }
+    // Certainly through: all three above zero, or all below.
+    let through = least.simd_gt(margin) | most.simd_lt(-margin);
+
+    // The sign of det goes to t's numerator; where it is uncertain the margin is wide enough for both.
+    let t = dot(n, c);
+    let depth = (size * size).mul_add(splat(simd, margins.depth), splat(simd, UNDERFLOW));
+    let size_of_det = det.abs();
+    let signed = t * splat(simd, 1.0).copysign(det);
+    let beyond = (signed - size_of_det * last).simd_gt(depth);
+    let before = (signed - size_of_det * t_min).simd_lt(-depth);
+    let maybe = !(outside | (beyond | before).to_bitmask() as u32) & 0xff;
+    if maybe == 0 {
+        return None;
+    }
+    let depths = Depths { numerator: signed.into(), denominator: size_of_det.into(), margin: depth.into() };
+    Some(Outcome { maybe, through: through.to_bitmask() as u32, depths })
+}
+
+impl Margins {
+    #[inline(always)]
+    fn edges<S: Simd>(&self, simd: S, size: f32x8<S>) -> f32x8<S> {
+        size.mul_add(size.mul_add(splat(simd, self.edge2), splat(simd, self.edge)), splat(simd, UNDERFLOW))
+    }
+}
+
+/// All rays of a bundle at once, as a middle one and how far the others are from it.
+pub(super) struct Thick<S: Simd> {
+    origin: Vec8<S>,
+    direction: Vec8<S>,
+    /// Largest difference of a direction, and the part of (v₀ − o) × d's difference that no triangle has a say in.
+    turn: Vec8<S>,
+    shift: Vec8<S>,
+    margins: Margins,
+}
+
+impl<S: Simd> Thick<S> {
+    #[inline(always)]
+    pub(super) fn new(simd: S, bundle: &Bundle, margins: Margins) -> Self {
+        // Up by far more than the roundings of what is made of them.
+        let up = 1.0 + 1e-5;
+        let turn = bundle.direction_spread.map(|x| x * up);
+        let moved = bundle.origin_spread.map(|x| x * up);
+        let most = |i: usize| bundle.direction[i].abs() + turn[i];
+        let shift = [[1, 2], [2, 0], [0, 1]].map(|[j, k]| (moved[j] * most(k) + moved[k] * most(j)) * up);
+        Self {
+            origin: spread(simd, &bundle.origin),
+            direction: spread(simd, &bundle.direction),
+            turn: spread(simd, &turn),
+            shift: shift.map(|x| splat(simd, x)),
+            margins,
+        }
+    }
+
+    /// The triangles that are not certain to be missed by all.
+    #[inline(always)]
+    pub(super) fn test(&self, simd: S, triangles: &Triangles<S>) -> u32 {
+        let &Triangles { v0, e1, e2, size } = triangles;
+        let c = minus(v0, self.origin);
+        let r = cross(c, self.direction);
         let n = cross(e1, e2);
-        let det = dot(n, d);
+        let det = dot(n, self.direction);
         let u = dot(r, e2);
         let v = -dot(r, e1);
         let w = det - u - v;
-        let margin =
-            size.mul_add(size.mul_add(splat(simd, self.edge2), splat(simd, self.edge)), splat(simd, UNDERFLOW));
-        // Certainly a miss: one edge function above zero, another below. An empty lane has a negative margin.
-        let least = u.min(v.min(w));
-        let most = u.max(v.max(w));
-        let outside = (least.simd_lt(-margin) & most.simd_gt(margin)).to_bitmask() as u32;
-        if outside == 0xff {
-            return None;
-        }
-        // Certainly through: all three above zero, or all below.
-        let through = least.simd_gt(margin) | most.simd_lt(-margin);
-
-        // The sign of det goes to t's numerator; where it is uncertain the margin is wide enough for both.
-        let t = dot(n, c);
-        let depth = (size * size).mul_add(splat(simd, self.depth), splat(simd, UNDERFLOW));
-        let size_of_det = det.abs();
-        let signed = t * splat(simd, 1.0).copysign(det);
-        let beyond = (signed - size_of_det * splat(simd, self.last(t_max))).simd_gt(depth);
-        let before = (signed - size_of_det * splat(simd, self.t_min)).simd_lt(-depth);
-        let maybe = !(outside | (beyond | before).to_bitmask() as u32) & 0xff;
-        if maybe == 0 {
-            return None;
-        }
-        let depths = Depths { numerator: signed.into(), denominator: size_of_det.into(), margin: depth.into() };
-        Some(Outcome { maybe, through: through.to_bitmask() as u32, depths })
+        // How much of r, and with it of u, v, det and w, the rays differ by.
+        let (c, turn) = (c.map(f32x8::abs), &self.turn);
+        let r = [[1, 2], [2, 0], [0, 1]].map(|[j, k]| [c[j] * turn[k], c[k] * turn[j]]);
+        let r = [0, 1, 2].map(|i| r[i][0] + (r[i][1] + self.shift[i]));
+        let (of_u, of_v) = (dot(r, e2.map(f32x8::abs)), dot(r, e1.map(f32x8::abs)));
+        let of_w = dot(n.map(f32x8::abs), *turn) + (of_u + of_v);
+        let margin = self.margins.edges(simd, size);
+        let up = splat(simd, 1.0 + 1e-5);
+        let (of_u, of_v, of_w) = (of_u.mul_add(up, margin), of_v.mul_add(up, margin), of_w.mul_add(up, margin));
+        let below = u.simd_lt(-of_u) | v.simd_lt(-of_v) | w.simd_lt(-of_w);
+        let above = u.simd_gt(of_u) | v.simd_gt(of_v) | w.simd_gt(of_w);
+        let empty = size.simd_lt(0.0);
+        !(((below & above) | empty).to_bitmask() as u32) & 0xff
     }
 }
 
@@ -229,7 +343,7 @@ impl Depths {
     }
 }
 
-type Vec8<S> = [f32x8<S>; 3];
+pub(super) type Vec8<S> = [f32x8<S>; 3];
 
 #[inline(always)]
 fn splat<S: Simd>(simd: S, x: f32) -> f32x8<S> {
@@ -242,7 +356,7 @@ fn spread<S: Simd>(simd: S, v: &[f32; 4]) -> Vec8<S> {
 }
 
 #[inline(always)]
-fn load<S: Simd>(simd: S, rows: &[[f32; 8]; 3]) -> Vec8<S> {
+pub(super) fn load<S: Simd>(simd: S, rows: &[[f32; 8]; 3]) -> Vec8<S> {
     [rows[0].simd_into(simd), rows[1].simd_into(simd), rows[2].simd_into(simd)]
 }
 

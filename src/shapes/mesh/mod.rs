@@ -4,6 +4,7 @@
 //! lost); [`kernel::triangle`] decides them exactly and gives λ.
 
 mod attributes;
+mod each;
 mod leaf;
 mod query;
 
@@ -152,6 +153,42 @@ impl Mesh {
     #[inline]
     pub fn vertices(&self, part: u32) -> [DVec3; 3] {
         self.triangles[part as usize].map(|i| self.positions[i as usize])
+    }
+
+    /// The nearest hits of many rays: `hits[i]` becomes what [`intersect`](Shape::intersect) answers to `rays[i]`, to the bit.
+    ///
+    /// Rays in a row that go much the same way, such as those of neighbouring pixels, are walked through the tree together,
+    /// which is several times as fast; tiles of 4 × 4 pixels do best. Others cost what they cost alone.
+    ///
+    /// ```
+    /// use truehit::{Interval, Mesh, Ray, Shape};
+    /// let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let mesh = Mesh::new(corners.map(Into::into).to_vec(), vec![[0, 1, 2]])?;
+    /// let rays: Vec<_> = (0..100)
+    ///     .map(|i| (Ray::new([0.3, 0.01 * f64::from(i), 2.0], [0.01, 0.02, -1.0]), Interval::FORWARD))
+    ///     .collect();
+    /// let mut hits = vec![None; rays.len()];
+    /// mesh.intersect_each(&rays, &mut hits);
+    /// assert_eq!(hits[7], mesh.intersect(&rays[7].0, rays[7].1));
+    /// assert_eq!(hits.iter().flatten().count(), 64);
+    /// # Ok::<(), truehit::InvalidShape>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn intersect_each(&self, rays: &[(Ray, Interval)], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "there must be one hit for each ray");
+        each::closest(self, rays, hits);
+    }
+
+    /// Whether many rays hit anything: [`occludes`](Shape::occludes) for each, as [`intersect_each`](Self::intersect_each)
+    /// for [`intersect`](Shape::intersect). Shadow rays of neighbouring pixels to one light do best.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn occludes_each(&self, rays: &[(Ray, Interval)], hits: &mut [bool]) {
+        assert_eq!(rays.len(), hits.len(), "there must be one answer for each ray");
+        each::any(self, rays, hits);
     }
 
     /// Uses the instructions of `level` from now on, if this CPU has them: for tests and benchmarks. All levels give

@@ -2,7 +2,7 @@
 
 use super::Mesh;
 use super::leaf::{Leaf, Outcome, Probe};
-use crate::bvh::{self, LocalRay};
+use crate::bvh::{self, Lanes, LocalRay};
 use crate::kernel::eft::{Fused, Split};
 use crate::kernel::triangle;
 use crate::{Hit, Interval, Ray};
@@ -18,22 +18,10 @@ pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
 #[inline(always)]
 fn closest_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
     let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else { return closest_of_all(mesh, ray, within) };
-    let mut nearest = Nearest {
-        mesh,
-        ray,
-        within,
-        local: &local,
-        probe: Probe::new(&local, mesh.exact),
-        t_max: local.t_max,
-        passed: [Passed { leaf: 0, lane: 0, t: 0.0 }; MOST_PASSED],
-        count: 0,
-        best: None,
-    };
-    bvh::closest(simd, &mesh.tree, &local, &mut nearest);
-    if nearest.count > 0 {
-        nearest.decide(simd);
-    }
-    nearest.best
+    let mut walk =
+        Single { probe: Probe::new(&local, mesh.exact), nearest: Nearest::new(mesh, ray, within, &local) };
+    bvh::closest(simd, &mesh.tree, &Lanes::new(simd, &local), local.t_max, &mut walk);
+    walk.nearest.settle(simd)
 }
 
 /// Whether anything is hit.
@@ -47,7 +35,7 @@ fn any_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> bool 
         return closest_of_all(mesh, ray, within).is_some();
     };
     let mut first = First { mesh, ray, within, local: &local, probe: Probe::new(&local, mesh.exact) };
-    bvh::any(simd, &mesh.tree, &local, &mut first)
+    bvh::any(simd, &mesh.tree, &Lanes::new(simd, &local), local.t_max, &mut first)
 }
 
 /// A ray that has no place in the tree's frame.
@@ -98,20 +86,20 @@ fn confirm<S: Simd>(simd: S, ray: &Ray, vertices: &[DVec3; 3], within: Interval)
 
 /// What is certainly inside the interval: limits of t rounded inward.
 #[derive(Clone, Copy)]
-struct Sure {
+pub(super) struct Sure {
     min: f32,
     max: f32,
 }
 
 impl Sure {
     #[inline(always)]
-    fn new(local: &LocalRay, within: Interval) -> Self {
+    pub(super) fn new(local: &LocalRay, within: Interval) -> Self {
         Self { min: local.upper(within.min), max: local.lower(within.max) }
     }
 
     /// Whether a t between these is inside for certain; not if one is NaN.
     #[inline(always)]
-    fn holds(self, (low, high): (f32, f32)) -> bool {
+    pub(super) fn holds(self, (low, high): (f32, f32)) -> bool {
         (low > self.min) & (high < self.max)
     }
 }
@@ -126,60 +114,60 @@ struct Passed {
 
 const MOST_PASSED: usize = 4;
 
-/// The walk to the nearest hit. Triangles that the filter is certain of only shorten the ray; which of them is the
+/// The search for the nearest hit. Triangles that the filter is certain of only shorten the ray; which of them is the
 /// nearest, and λ, is settled in f64 when the walk has ended and few are left.
-struct Nearest<'a> {
+pub(super) struct Nearest<'a> {
     mesh: &'a Mesh,
     ray: &'a Ray,
     within: Interval,
     local: &'a LocalRay,
-    probe: Probe,
-    t_max: f32,
+    pub(super) t_max: f32,
     passed: [Passed; MOST_PASSED],
     count: usize,
     best: Option<Hit>,
 }
 
-impl Nearest<'_> {
-    /// Out of line, so that the walk keeps its registers.
-    #[inline(never)]
-    fn visit<S: Simd>(&mut self, simd: S, leaf: u32) {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                if let Some(outcome) = self.probe.test(simd, &self.mesh.leaves[leaf as usize], self.t_max) {
-                    self.candidates(simd, leaf, &outcome);
-                }
-            },
-        );
+impl<'a> Nearest<'a> {
+    #[inline(always)]
+    pub(super) fn new(mesh: &'a Mesh, ray: &'a Ray, within: Interval, local: &'a LocalRay) -> Self {
+        let passed = [Passed { leaf: 0, lane: 0, t: 0.0 }; MOST_PASSED];
+        Self { mesh, ray, within, local, t_max: local.t_max, passed, count: 0, best: None }
     }
 
-    #[inline(never)]
-    fn candidates<S: Simd>(&mut self, simd: S, leaf: u32, outcome: &Outcome) {
-        let &Outcome { maybe: mut lanes, through, ref depths } = outcome;
-        let sure = Sure::new(self.local, self.within);
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros();
-            lanes &= lanes - 1;
-            // Elsewhere the sign of the denominator is not known, and the depths mean nothing.
-            let certain = through >> lane & 1 == 1;
-            let (low, high) = depths.interval(lane as usize);
-            if certain && low > self.t_max {
-                continue;
-            }
-            if !(certain && sure.holds((low, high))) {
-                self.confirm(simd, leaf, lane);
-                continue;
-            }
-            if high < self.t_max {
-                self.t_max = high;
-            }
-            if self.count == MOST_PASSED {
-                self.decide(simd);
-            }
-            self.passed[self.count % MOST_PASSED] = Passed { leaf, lane, t: low };
-            self.count += 1;
+    /// The answer.
+    #[inline(always)]
+    pub(super) fn settle<S: Simd>(mut self, simd: S) -> Option<Hit> {
+        if self.count > 0 {
+            self.decide(simd);
         }
+        self.best
+    }
+
+    /// Considers a triangle that may be met between the t of `depth`; `through`: whose inside the line certainly passes.
+    #[inline(always)]
+    pub(super) fn consider<S: Simd>(
+        &mut self,
+        simd: S,
+        sure: Sure,
+        [leaf, lane]: [u32; 2],
+        through: bool,
+        (low, high): (f32, f32),
+    ) {
+        // Elsewhere the sign of the denominator is not known, and the depths mean nothing.
+        if through && low > self.t_max {
+            return;
+        }
+        if !(through && sure.holds((low, high))) {
+            return self.confirm(simd, leaf, lane);
+        }
+        if high < self.t_max {
+            self.t_max = high;
+        }
+        if self.count == MOST_PASSED {
+            self.decide(simd);
+        }
+        self.passed[self.count % MOST_PASSED] = Passed { leaf, lane, t: low };
+        self.count += 1;
     }
 
     /// Decides the triangles that are still in question.
@@ -213,11 +201,45 @@ impl Nearest<'_> {
     }
 }
 
-impl bvh::Closest for Nearest<'_> {
+/// One ray's walk to the nearest hit.
+struct Single<'a> {
+    probe: Probe,
+    nearest: Nearest<'a>,
+}
+
+impl<S: Simd> bvh::Closest<S> for Single<'_> {
     #[inline(always)]
-    fn leaf<S: Simd>(&mut self, simd: S, leaf: u32) -> f32 {
+    fn leaf(&mut self, simd: S, leaf: u32) -> f32 {
         self.visit(simd, leaf);
-        self.t_max
+        self.nearest.t_max
+    }
+}
+
+impl Single<'_> {
+    /// Out of line, so that the walk keeps its registers.
+    #[inline(never)]
+    fn visit<S: Simd>(&mut self, simd: S, leaf: u32) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let triangles = &self.nearest.mesh.leaves[leaf as usize];
+                if let Some(outcome) = self.probe.test(simd, triangles, self.nearest.t_max) {
+                    self.candidates(simd, leaf, &outcome);
+                }
+            },
+        );
+    }
+
+    #[inline(never)]
+    fn candidates<S: Simd>(&mut self, simd: S, leaf: u32, outcome: &Outcome) {
+        let sure = Sure::new(self.nearest.local, self.nearest.within);
+        let mut lanes = outcome.maybe;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros();
+            lanes &= lanes - 1;
+            let through = outcome.through >> lane & 1 == 1;
+            self.nearest.consider(simd, sure, [leaf, lane], through, outcome.depths.interval(lane as usize));
+        }
     }
 }
 
@@ -230,9 +252,9 @@ struct First<'a> {
     probe: Probe,
 }
 
-impl bvh::Any for First<'_> {
+impl<S: Simd> bvh::Any<S> for First<'_> {
     #[inline(always)]
-    fn leaf<S: Simd>(&mut self, simd: S, leaf: u32) -> bool {
+    fn leaf(&mut self, simd: S, leaf: u32) -> bool {
         self.visit(simd, &self.mesh.leaves[leaf as usize])
     }
 }
@@ -255,14 +277,22 @@ impl First<'_> {
         let sure = Sure::new(self.local, self.within);
         let each = |lanes: u32| (0..8).filter(move |lane| lanes >> lane & 1 == 1);
         each(lanes & through).any(|lane| sure.holds(depths.interval(lane)))
-            || each(lanes).any(|lane| self.confirm(simd, leaf, lane))
+            || each(lanes).any(|lane| occluded(simd, self.mesh, self.ray, self.within, leaf, lane))
     }
+}
 
-    #[inline(never)]
-    fn confirm<S: Simd>(&self, simd: S, leaf: &Leaf, lane: usize) -> bool {
-        simd.vectorize(
-            #[inline(always)]
-            || confirm(simd, self.ray, &leaf.vertices(lane & 7, self.mesh), self.within).is_some(),
-        )
-    }
+/// Whether a triangle is hit, exactly.
+#[inline(never)]
+pub(super) fn occluded<S: Simd>(
+    simd: S,
+    mesh: &Mesh,
+    ray: &Ray,
+    within: Interval,
+    leaf: &Leaf,
+    lane: usize,
+) -> bool {
+    simd.vectorize(
+        #[inline(always)]
+        || confirm(simd, ray, &leaf.vertices(lane & 7, mesh), within).is_some(),
+    )
 }

@@ -30,6 +30,7 @@ pub fn all(embree: Option<&Arc<Embree>>) -> Vec<Maker> {
         makers.push(Maker { name, double, make: Box::new(make) });
     };
     add("truehit", true, |mesh| Box::new(truehit::Single::new(mesh)));
+    add("truehit, slices", true, |mesh| Box::new(truehit::Slices::new(mesh)));
     add("obvhs CWBVH", false, |mesh| Box::new(obvhs::Cw::new(mesh)));
     add("obvhs BVH2", false, |mesh| Box::new(obvhs::Binary::new(mesh)));
     add("parry3d", false, |mesh| Box::new(parry::Single::new(mesh)));

@@ -3,7 +3,7 @@
 use crate::engine::{Engine, Found, RaySet};
 use crate::mesh::Mesh;
 use truehit::glam::DVec3;
-use truehit::{Interval, Shape};
+use truehit::{Hit, Shape};
 
 pub struct Single(truehit::Mesh);
 
@@ -20,18 +20,44 @@ impl Single {
 
 impl Engine for Single {
     fn closest(&mut self, set: &RaySet, found: &mut [Found]) {
-        for ((ray, limit), found) in set.double.iter().zip(&set.rays).zip(found) {
-            let within = Interval::new(0.0, limit.max.into());
-            *found = self
-                .0
-                .intersect(ray, within)
-                .map_or(Found::MISS, |hit| Found { triangle: hit.part, lambda: hit.lambda });
+        for ((ray, within), found) in set.double.iter().zip(found) {
+            *found = as_found(self.0.intersect(ray, *within));
         }
     }
 
     fn any(&mut self, set: &RaySet, hit: &mut [bool]) {
-        for ((ray, limit), hit) in set.double.iter().zip(&set.rays).zip(hit) {
-            *hit = self.0.occludes(ray, Interval::new(0.0, limit.max.into()));
+        for ((ray, within), hit) in set.double.iter().zip(hit) {
+            *hit = self.0.occludes(ray, *within);
         }
+    }
+}
+
+fn as_found(hit: Option<Hit>) -> Found {
+    hit.map_or(Found::MISS, |hit| Found { triangle: hit.part, lambda: hit.lambda })
+}
+
+/// All rays in one call.
+pub struct Slices {
+    mesh: truehit::Mesh,
+    hits: Vec<Option<Hit>>,
+}
+
+impl Slices {
+    pub fn new(source: &Mesh) -> Self {
+        Self { mesh: build(source), hits: Vec::new() }
+    }
+}
+
+impl Engine for Slices {
+    fn closest(&mut self, set: &RaySet, found: &mut [Found]) {
+        self.hits.resize(set.double.len(), None);
+        self.mesh.intersect_each(&set.double, &mut self.hits);
+        for (hit, found) in self.hits.iter().zip(found) {
+            *found = as_found(*hit);
+        }
+    }
+
+    fn any(&mut self, set: &RaySet, hit: &mut [bool]) {
+        self.mesh.occludes_each(&set.double, hit);
     }
 }
