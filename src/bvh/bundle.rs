@@ -3,10 +3,12 @@
 //! A box is skipped if no ray with an origin and an inverse direction between the bundle's bounds meets it:
 //! docs/numerics.md §10. The walk costs what one ray's costs, and finds the leaves of all.
 
-use super::slab::LocalRay;
+use super::frame::Frame;
+use super::slab::{LENGTHS, Limits, NEAR, PLAIN_ERROR};
 use super::traverse::Beam;
 use super::wide::WideNode;
-use fearless_simd::{Simd, f32x4, f32x8, prelude::*};
+use crate::{Interval, Ray};
+use fearless_simd::{Simd, f32x8, prelude::*};
 
 /// How many rays a bundle has.
 pub(crate) const RAYS: usize = 16;
@@ -24,86 +26,131 @@ const E: f32 = f32::EPSILON / 2.0;
 /// What underflow may take from a product of a distance and an inverse, and far below any t that matters.
 const UNDERFLOW: f32 = 1e-30;
 
-/// Bounds of the rays of a bundle, all rounded outward.
+/// Eight rays, by lane, in the tree's frame as [`LocalRay`](super::LocalRay) has them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Eight {
+    pub(crate) origin: [[f32; 8]; 3],
+    pub(crate) direction: [[f32; 8]; 3],
+    pub(crate) t_min: [f32; 8],
+    pub(crate) t_max: [f32; 8],
+}
+
+/// Rays and the bounds of them all, rounded outward.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bundle {
+    pub(crate) rays: [Eight; RAYS / 8],
     /// Bit i: the directions' coordinates i are negative.
     away: u32,
     /// The end of the origins' range that is nearest to a plane in front, by axis, and the farthest.
-    near_origin: [f32; 4],
-    far_origin: [f32; 4],
+    near_origin: [f32; 3],
+    far_origin: [f32; 3],
     /// The least and the greatest 1/direction.
-    inverse: [[f32; 4]; 2],
+    inverse: [[f32; 3]; 2],
     t_min: f32,
+    /// The largest t that matters to one of them.
+    pub(crate) t_max: f32,
     /// The middle of all origins, and how far they are from it by axis.
-    pub(crate) origin: [f32; 4],
-    pub(crate) origin_spread: [f32; 4],
+    pub(crate) origin: [f32; 3],
+    pub(crate) origin_spread: [f32; 3],
     /// The same of directions.
-    pub(crate) direction: [f32; 4],
-    pub(crate) direction_spread: [f32; 4],
+    pub(crate) direction: [f32; 3],
+    pub(crate) direction_spread: [f32; 3],
+    /// The largest coordinate of an origin.
+    pub(crate) size: f32,
+    /// The shortest and the longest direction, by their largest coordinates.
+    pub(crate) lengths: [f32; 2],
+}
+
+/// The least and the greatest of all lanes of two vectors.
+#[inline(always)]
+fn range<S: Simd>([a, b]: [f32x8<S>; 2]) -> [f32; 2] {
+    [a.min(b).reduce_min(), a.max(b).reduce_max()]
 }
 
 impl Bundle {
-    /// `None` if the rays go too different ways.
+    /// `None` if the rays go too different ways, if one of them is not taken as it is by
+    /// [`LocalRay::new`](super::LocalRay::new), or if an interval is empty.
     #[inline(always)]
-    pub(crate) fn around<S: Simd>(simd: S, rays: &[LocalRay; RAYS]) -> Option<Self> {
-        let vector = |v: &[f32; 4]| f32x4::<S>::simd_from(simd, *v);
-        let first = &rays[0];
-        let range = |v: &[f32; 4]| [vector(v), vector(v)];
-        let (mut origins, mut directions, mut inverses) =
-            (range(&first.origin), range(&first.direction), range(&first.inv));
-        let (mut t_min, mut error, mut length, mut mixed) = (first.t_min, first.origin_error, first.length, 0);
-        let grow = |[low, high]: &mut [f32x4<S>; 2], v: &[f32; 4]| {
-            *low = low.min(vector(v));
-            *high = high.max(vector(v));
-        };
-        for ray in &rays[1..] {
-            grow(&mut origins, &ray.origin);
-            grow(&mut directions, &ray.direction);
-            grow(&mut inverses, &ray.inv);
-            mixed |= ray.away ^ first.away;
-            t_min = t_min.min(ray.t_min);
-            error = error.max(ray.origin_error);
-            length = length.min(ray.length);
+    pub(crate) fn new<S: Simd>(simd: S, frame: &Frame, rays: &[(Ray, Interval); RAYS]) -> Option<Self> {
+        const ZERO: [f32; 8] = [0.0; 8];
+        let mut eights = [Eight { origin: [ZERO; 3], direction: [ZERO; 3], t_min: ZERO, t_max: ZERO }; RAYS / 8];
+        let mut empty = false;
+        for (i, (ray, within)) in rays.iter().enumerate() {
+            let (eight, lane) = (&mut eights[i / 8], i % 8);
+            let (o, d) = ((ray.origin - frame.center) * frame.scale, ray.direction * frame.scale);
+            for axis in 0..3 {
+                eight.origin[axis][lane] = o[axis] as f32;
+                eight.direction[axis][lane] = d[axis] as f32;
+            }
+            (eight.t_min[lane], eight.t_max[lane]) = (Limits::PLAIN.lower(within.min), Limits::PLAIN.upper(within.max));
+            empty |= within.is_empty();
         }
-        let narrow = (directions[1] - directions[0]).simd_le(WIDEST * length) & (origins[1] - origins[0]).simd_le(WIDEST);
-        let gentlest = directions[0].abs().min(directions[1].abs());
-        let steep = gentlest.simd_ge(FLATTEST * length);
-        if (mixed != 0) | (narrow.to_bitmask() & 7 != 7) | (steep.to_bitmask() & 7 != 7) {
+        let load = |of: fn(&Eight) -> &[f32; 8]| [0, 1].map(|i: usize| f32x8::<S>::simd_from(simd, *of(&eights[i])));
+        let o = [load(|e| &e.origin[0]), load(|e| &e.origin[1]), load(|e| &e.origin[2])];
+        let d = [load(|e| &e.direction[0]), load(|e| &e.direction[1]), load(|e| &e.direction[2])];
+        let longest = [0, 1].map(|i| d[0][i].abs().max(d[1][i].abs()).max(d[2][i].abs()));
+        let (origins, directions, lengths) = (o.map(range), d.map(range), range(longest));
+        let [t_min, _] = range(load(|e| &e.t_min));
+        let [_, t_max] = range(load(|e| &e.t_max));
+        // Sums of a NaN or an infinity with others are one, and fail the comparisons below.
+        let sums = [0, 1].map(|i| (o[0][i] + o[1][i] + o[2][i]) + (d[0][i] + d[1][i] + d[2][i]));
+        let sum = (sums[0] + sums[1]).reduce_sum();
+        let largest = |[low, high]: [f32; 2]| if -low > high { -low } else { high };
+        let size = origins.iter().fold(0.0, |m: f32, &r| m.max(largest(r)));
+        let plain = (size <= NEAR) & (lengths[0] >= LENGTHS[0]) & (lengths[1] <= LENGTHS[1]) & sum.is_finite() & !empty;
+        let alike = |axis: usize| {
+            let ([o_low, o_high], [d_low, d_high]) = (origins[axis], directions[axis]);
+            let gentlest = if d_low.abs() < d_high.abs() { d_low.abs() } else { d_high.abs() };
+            (o_high - o_low <= WIDEST)
+                & (d_high - d_low <= WIDEST * lengths[0])
+                & ((d_low < 0.0) == (d_high < 0.0))
+                & (gentlest >= FLATTEST * lengths[0])
+        };
+        if !(plain & alike(0) & alike(1) & alike(2)) {
             return None;
         }
-        let largest = |[low, high]: &[f32x4<S>; 2]| low.abs().max(high.abs());
-        let halves = |[low, high]: &[f32x4<S>; 2], off: f32x4<S>| {
-            let middle = (*low + *high) * 0.5;
-            let spread = (*high - middle).max(middle - *low) * (1.0 + 4.0 * E) + off;
-            (middle.into(), spread.into())
-        };
-        let origin_off = largest(&origins) * (4.0 * E) + f32x4::splat(simd, 2.0 * error);
-        let direction_off = largest(&directions) * (4.0 * E);
-        let (origin, origin_spread) = halves(&origins, origin_off);
-        let (direction, direction_spread) = halves(&directions, direction_off);
-        let (low, high) = (origins[0] - origin_off, origins[1] + origin_off);
-        let backward = inverses[0].simd_lt(0.0);
-        Some(Self {
-            away: first.away,
-            near_origin: backward.select(low, high).into(),
-            far_origin: backward.select(high, low).into(),
-            inverse: [
-                (inverses[0] - inverses[0].abs() * (8.0 * E)).into(),
-                (inverses[1] + inverses[1].abs() * (8.0 * E)).into(),
-            ],
+        let mut bundle = Self {
+            rays: eights,
+            away: 0,
+            near_origin: [0.0; 3],
+            far_origin: [0.0; 3],
+            inverse: [[0.0; 3]; 2],
             t_min,
-            origin,
-            origin_spread,
-            direction,
-            direction_spread,
-        })
+            t_max,
+            origin: [0.0; 3],
+            origin_spread: [0.0; 3],
+            direction: [0.0; 3],
+            direction_spread: [0.0; 3],
+            size,
+            lengths,
+        };
+        let halves = |[low, high]: [f32; 2], off: f32| {
+            let middle = 0.5 * (low + high);
+            let (above, below) = (high - middle, middle - low);
+            (middle, (if above > below { above } else { below }) * (1.0 + 4.0 * E) + off)
+        };
+        for axis in 0..3 {
+            let (o, d) = (origins[axis], directions[axis]);
+            let (o_off, d_off) = (4.0 * E * largest(o) + 2.0 * PLAIN_ERROR, 4.0 * E * largest(d));
+            (bundle.origin[axis], bundle.origin_spread[axis]) = halves(o, o_off);
+            (bundle.direction[axis], bundle.direction_spread[axis]) = halves(d, d_off);
+            let (low, high) = (o[0] - o_off, o[1] + o_off);
+            let backward = d[0] < 0.0;
+            bundle.away |= u32::from(backward) << axis;
+            (bundle.near_origin[axis], bundle.far_origin[axis]) = if backward { (low, high) } else { (high, low) };
+            // Of directions with one sign the greatest has the least inverse. The margin is for five roundings: of the direction,
+            // of its inverse, and of difference and product in the test.
+            let (least, greatest) = (1.0 / d[1], 1.0 / d[0]);
+            bundle.inverse[0][axis] = least - least.abs() * (8.0 * E);
+            bundle.inverse[1][axis] = greatest + greatest.abs() * (8.0 * E);
+        }
+        Some(bundle)
     }
 
     /// The bounds in every lane.
     #[inline(always)]
     pub(crate) fn lanes<S: Simd>(&self, simd: S) -> Lanes<S> {
-        let spread = |v: &[f32; 4]| [0, 1, 2].map(|i| f32x8::splat(simd, v[i]));
+        let spread = |v: &[f32; 3]| v.map(|x| f32x8::splat(simd, x));
         Lanes {
             near_origin: spread(&self.near_origin),
             far_origin: spread(&self.far_origin),

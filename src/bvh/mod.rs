@@ -162,7 +162,7 @@ impl<S: Simd, F: FnMut(u32, f64) -> f64> Closest<S> for Nearest<'_, F> {
         for &object in self.bvh.leaf(leaf) {
             self.bound = (self.visit)(object, self.bound);
         }
-        self.local.upper(self.bound)
+        self.local.limits.upper(self.bound)
     }
 }
 

@@ -10,8 +10,7 @@ use crate::{Interval, Ray};
 use fearless_simd::{Simd, f32x4, f64x2, prelude::*};
 use glam::DVec3;
 
-/// A ray in the frame of a tree, with what the box and leaf tests need of it: `origin` + t·`direction`,
-/// t = λ·stretch − advance.
+/// A ray in the frame of a tree, with what the box and leaf tests need of it: `origin` + t·`direction`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalRay {
     /// Bit i: the direction's coordinate i is negative.
@@ -34,6 +33,12 @@ pub(crate) struct LocalRay {
     pub(crate) length: f32,
     /// Each coordinate of the origin was off the ray by at most this before it was rounded.
     pub(crate) origin_error: f32,
+    pub(crate) limits: Limits,
+}
+
+/// λ and t of a ray: t = λ·stretch − advance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limits {
     stretch: f64,
     advance: f64,
 }
@@ -46,10 +51,13 @@ const SLAB: f32 = 8.0 / 16_777_216.0;
 const TINY: f64 = 1.0 / (1u64 << 60) as f64;
 
 /// Origins further out than this are first moved along the ray to the tree.
-const NEAR: f32 = 4.0;
+pub(super) const NEAR: f32 = 4.0;
 
 /// Directions in the frame whose largest coordinate is beyond these are first scaled.
-const LENGTHS: [f32; 2] = [1.0 / 1_099_511_627_776.0, 1_099_511_627_776.0]; // 2^±40
+pub(super) const LENGTHS: [f32; 2] = [1.0 / 1_099_511_627_776.0, 1_099_511_627_776.0]; // 2^±40
+
+/// [`LocalRay::origin_error`] of a ray that is taken as it is: 4u are needed.
+pub(crate) const PLAIN_ERROR: f32 = 8.0 * f64::EPSILON as f32;
 
 /// Origins beyond this, before or after, are not traced.
 const FARTHEST: f64 = 1_125_899_906_842_624.0; // 2⁵⁰
@@ -62,8 +70,7 @@ struct Placed<S: Simd> {
     error: f32,
     /// Slopes 1/direction beyond this are taken for it. A slab is then wider than the ray's stretch near the tree: §10.
     steepest: f32,
-    stretch: f64,
-    advance: f64,
+    limits: Limits,
 }
 
 impl LocalRay {
@@ -76,11 +83,9 @@ impl LocalRay {
         let mut placed = Placed {
             origin: [(pair(o.x, o.y) - pair(c.x, c.y)) * frame.scale, (pair(o.z, 0.0) - pair(c.z, 0.0)) * frame.scale],
             direction: [pair(d.x, d.y) * frame.scale, pair(d.z, 0.0) * frame.scale],
-            // 2u of an origin below 4, and the underflow.
-            error: 8.0 * f64::EPSILON as f32,
+            error: PLAIN_ERROR,
             steepest: LENGTHS[1] * LENGTHS[1],
-            stretch: 1.0,
-            advance: 0.0,
+            limits: Limits::PLAIN,
         };
         let (mut origin, mut direction) = placed.narrowed();
         let mut length = direction.abs().reduce_max();
@@ -99,25 +104,26 @@ impl LocalRay {
         let inv = gentle.select(f32x4::splat(simd, placed.steepest), one / direction);
         let pad = origin.abs().mul_add(f32x4::splat(simd, SLAB), f32x4::splat(simd, SLAB + 2.0 * placed.error));
         let (middle, half) = (origin * inv, inv.abs() * pad);
-        let mut local = Self {
+        Some(Self {
             away: inv.simd_lt(0.0).to_bitmask() as u32,
             inv: inv.into(),
             near_shift: (-middle - half).into(),
             far_shift: (half - middle).into(),
-            t_min: 0.0,
-            t_max: 0.0,
+            t_min: placed.limits.lower(within.min),
+            t_max: placed.limits.upper(within.max),
             origin: origin.into(),
             direction: direction.into(),
             size: origin.abs().reduce_max(),
             length,
             origin_error: placed.error,
-            stretch: placed.stretch,
-            advance: placed.advance,
-        };
-        local.t_min = local.lower(within.min);
-        local.t_max = local.upper(within.max);
-        Some(local)
+            limits: placed.limits,
+        })
     }
+}
+
+impl Limits {
+    /// t = λ.
+    pub(crate) const PLAIN: Self = Self { stretch: 1.0, advance: 0.0 };
 
     /// Not below the t of `lambda`.
     #[inline(always)]
@@ -180,8 +186,7 @@ fn place<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<Placed<S>> {
         // u·(|start| + |t·direction| + |origin|) ≤ u·(1 + 2 + 3)·reach, and the underflow of all; up by 2⁻¹⁰.
         error: (4.004 * f64::EPSILON * reach + f64::from(f32::MIN_POSITIVE)) as f32,
         steepest: LENGTHS[1],
-        stretch: power(k),
-        advance,
+        limits: Limits { stretch: power(k), advance },
     })
 }
 

@@ -2,95 +2,102 @@
 //! are those of each ray alone.
 
 use super::Mesh;
-use super::leaf::{Leaf, Margins, Outcome, Probe, Thick, Vec8, filter, load};
+use super::leaf::{Leaf, Outcome, Thick, Vec8, filter, load};
 use super::query::{self, Nearest, Sure, occluded};
-use crate::bvh::{self, Bundle, LocalRay, RAYS};
+use crate::bvh::{self, Bundle, Eight, Limits, RAYS};
 use crate::{Hit, Interval, Ray};
-use fearless_simd::{Simd, dispatch, prelude::*};
+use fearless_simd::{Simd, dispatch, f32x8, prelude::*};
 
 /// A ray and the stretch of it that counts.
 type Stretch = (Ray, Interval);
 
 /// `hits[i]` becomes the nearest hit of `rays[i]`.
 pub(super) fn closest(mesh: &Mesh, rays: &[Stretch], hits: &mut [Option<Hit>]) {
-    let alone = |stretches: &[Stretch], hits: &mut [Option<Hit>]| {
-        for (hit, (ray, within)) in hits.iter_mut().zip(stretches) {
-            *hit = query::closest(mesh, ray, *within);
-        }
-    };
-    let (bundles, rest) = rays.as_chunks::<RAYS>();
-    let (of_bundles, of_rest) = hits.as_chunks_mut::<RAYS>();
-    for (rays, hits) in bundles.iter().zip(of_bundles) {
-        let together = go_together(rays) && dispatch!(mesh.level.token(), simd => closest_with(simd, mesh, rays, hits));
-        if !together {
-            alone(rays, hits);
-        }
-    }
-    alone(rest, of_rest);
+    each(
+        rays,
+        hits,
+        |rays, hits| dispatch!(mesh.level.token(), simd => closest_with(simd, mesh, rays, hits)),
+        |(ray, within)| query::closest(mesh, ray, *within),
+    );
 }
 
 /// `hits[i]` becomes whether `rays[i]` hits anything.
 pub(super) fn any(mesh: &Mesh, rays: &[Stretch], hits: &mut [bool]) {
-    let alone = |stretches: &[Stretch], hits: &mut [bool]| {
-        for (hit, (ray, within)) in hits.iter_mut().zip(stretches) {
-            *hit = query::any(mesh, ray, *within);
-        }
-    };
+    each(
+        rays,
+        hits,
+        |rays, hits| dispatch!(mesh.level.token(), simd => any_with(simd, mesh, rays, hits)),
+        |(ray, within)| query::any(mesh, ray, *within),
+    );
+}
+
+/// Sixteen at a time by `together`, which may refuse, the others one by one. After a refusal bundles are tried ever more
+/// seldom, so that rays without any order cost no more than alone.
+fn each<T>(
+    rays: &[Stretch],
+    hits: &mut [T],
+    together: impl Fn(&[Stretch; RAYS], &mut [T; RAYS]) -> bool,
+    alone: impl Fn(&Stretch) -> T,
+) {
+    const MOST_PATIENT: u32 = 64;
+    let (mut wait, mut patience) = (0, 1);
     let (bundles, rest) = rays.as_chunks::<RAYS>();
     let (of_bundles, of_rest) = hits.as_chunks_mut::<RAYS>();
     for (rays, hits) in bundles.iter().zip(of_bundles) {
-        let together = go_together(rays) && dispatch!(mesh.level.token(), simd => any_with(simd, mesh, rays, hits));
-        if !together {
-            alone(rays, hits);
+        if wait > 0 {
+            wait -= 1;
+        } else if go_together(rays) && together(rays, hits) {
+            patience = 1;
+            continue;
+        } else {
+            wait = patience;
+            patience = (2 * patience).min(MOST_PATIENT);
+        }
+        for (hit, ray) in hits.iter_mut().zip(rays) {
+            *hit = alone(ray);
         }
     }
-    alone(rest, of_rest);
+    for (hit, ray) in of_rest.iter_mut().zip(rest) {
+        *hit = alone(ray);
+    }
 }
 
-/// A first look that costs next to nothing: whether a few directions are alike. [`Bundle::around`] looks at all.
+/// A first look that costs next to nothing: whether a few directions are alike. [`Bundle::new`] looks at all.
 fn go_together(rays: &[Stretch; RAYS]) -> bool {
     let first = rays[0].0.direction;
     let close = 0.25 * first.abs().max_element();
     [5, 10, 15].iter().all(|&i| (rays[i].0.direction - first).abs().max_element() <= close)
 }
 
-/// Eight rays, by lane.
-#[derive(Clone, Copy)]
-struct Group {
-    origin: [[f32; 8]; 3],
-    direction: [[f32; 8]; 3],
-    t_min: [f32; 8],
-    /// The end of what matters; −∞ for a ray that has its answer.
-    last: [f32; 8],
-}
+/// A bundle in which more triangles than this are in question for some ray is too wide for its mesh: the rays are faster
+/// alone.
+const MOST_TRIANGLES: u32 = 40;
 
-/// What all rays of a bundle have in common, and what each has for itself.
+/// What all rays of a bundle have in common.
 struct Common<S: Simd> {
     thick: Thick<S>,
-    margins: Margins,
-    groups: [Group; 2],
+    /// The ends of what matters are kept up to date: −∞ for a ray that has its answer.
+    rays: [Eight; RAYS / 8],
+    tested: u32,
 }
 
 impl<S: Simd> Common<S> {
     #[inline(always)]
-    fn new(simd: S, mesh: &Mesh, bundle: &Bundle, rays: &[LocalRay; RAYS]) -> Self {
-        let mut groups = [Group { origin: [[0.0; 8]; 3], direction: [[0.0; 8]; 3], t_min: [0.0; 8], last: [0.0; 8] }; 2];
-        let mut margins: Option<Margins> = None;
-        for (i, ray) in rays.iter().enumerate() {
-            let probe = Probe::new(ray, mesh.exact);
-            let (group, lane) = (&mut groups[i / 8], i % 8);
-            for axis in 0..3 {
-                group.origin[axis][lane] = ray.origin[axis];
-                group.direction[axis][lane] = ray.direction[axis];
-            }
-            (group.t_min[lane], group.last[lane]) = (probe.t_min, probe.last(ray.t_max));
-            margins = Some(margins.map_or(probe.margins, |m| m.max(probe.margins)));
+    fn new(simd: S, bundle: &Bundle) -> Self {
+        let mut common = Self { thick: Thick::new(simd, bundle), rays: bundle.rays, tested: 0 };
+        let reach = f32x8::splat(simd, common.thick.reach);
+        for eight in &mut common.rays {
+            let (t_min, t_max): (f32x8<S>, f32x8<S>) = (eight.t_min.simd_into(simd), eight.t_max.simd_into(simd));
+            (eight.t_min, eight.t_max) = (t_min.max(-reach).into(), t_max.min(reach).into());
         }
-        let margins = margins.expect("a bundle has rays");
-        Self { thick: Thick::new(simd, bundle, margins), margins, groups }
+        common
     }
 
-    /// Calls `each` for every triangle and group of rays of which some may meet it, until it answers no.
+    fn too_wide(&self) -> bool {
+        self.tested > MOST_TRIANGLES
+    }
+
+    /// Calls `each` for every triangle and eight rays of which some may meet it, until it answers no.
     #[inline(always)]
     fn visit(
         &mut self,
@@ -100,15 +107,16 @@ impl<S: Simd> Common<S> {
         mut each: impl FnMut(&mut [f32; 8], u32, usize, &Outcome) -> bool,
     ) {
         let mut triangles = self.thick.test(simd, &leaf.triangles(simd, exact));
+        self.tested += triangles.count_ones();
         while triangles != 0 {
             let lane = triangles.trailing_zeros();
             triangles &= triangles - 1;
             let triangle = leaf.triangle(simd, lane as usize, exact);
-            for (i, group) in self.groups.iter_mut().enumerate() {
-                let ray: [Vec8<S>; 2] = [load(simd, &group.origin), load(simd, &group.direction)];
-                let stretch = [group.t_min.simd_into(simd), group.last.simd_into(simd)];
-                if let Some(outcome) = filter(simd, &triangle, ray, &self.margins, stretch)
-                    && !each(&mut group.last, lane, i, &outcome)
+            for (i, eight) in self.rays.iter_mut().enumerate() {
+                let ray: [Vec8<S>; 2] = [load(simd, &eight.origin), load(simd, &eight.direction)];
+                let stretch = [eight.t_min.simd_into(simd), eight.t_max.simd_into(simd)];
+                if let Some(outcome) = filter(simd, &triangle, ray, &self.thick.margins, stretch)
+                    && !each(&mut eight.t_max, lane, 8 * i, &outcome)
                 {
                     return;
                 }
@@ -117,32 +125,24 @@ impl<S: Simd> Common<S> {
     }
 }
 
-/// The rays in the frame, and their bundle if they are one.
-#[inline(always)]
-fn gather<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS]) -> Option<([LocalRay; RAYS], Bundle)> {
-    let first = LocalRay::new(simd, mesh.frame(), &rays[0].0, rays[0].1)?;
-    let mut locals = [first; RAYS];
-    for (local, (ray, within)) in locals.iter_mut().zip(rays).skip(1) {
-        *local = LocalRay::new(simd, mesh.frame(), ray, *within)?;
-    }
-    let bundle = Bundle::around(simd, &locals)?;
-    Some((locals, bundle))
-}
-
 /// `false`, and nothing done, if the rays are no bundle.
 #[inline(always)]
 fn closest_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mut [Option<Hit>; RAYS]) -> bool {
-    let Some((locals, bundle)) = gather(simd, mesh, rays) else { return false };
-    let t_max = locals.iter().fold(f32::NEG_INFINITY, |m, l| m.max(l.t_max));
+    let Some(bundle) = Bundle::new(simd, mesh.frame(), rays) else { return false };
     let mut walk = Together {
         mesh,
-        common: Common::new(simd, mesh, &bundle, &locals),
-        sure: std::array::from_fn(|i| Sure::new(&locals[i], rays[i].1)),
-        nearest: std::array::from_fn(|i| Nearest::new(mesh, &rays[i].0, rays[i].1, &locals[i])),
-        t_max,
+        common: Common::new(simd, &bundle),
+        nearest: std::array::from_fn(|i| {
+            let (ray, within) = &rays[i];
+            Nearest::new(mesh, ray, *within, Limits::PLAIN, bundle.rays[i / 8].t_max[i % 8])
+        }),
+        t_max: bundle.t_max,
     };
-    bvh::closest(simd, &mesh.tree, &bundle.lanes(simd), t_max, &mut walk);
-    for (hit, nearest) in hits.iter_mut().zip(walk.nearest) {
+    bvh::closest(simd, &mesh.tree, &bundle.lanes(simd), bundle.t_max, &mut walk);
+    if walk.common.too_wide() {
+        return false;
+    }
+    for (hit, nearest) in hits.iter_mut().zip(&mut walk.nearest) {
         *hit = nearest.settle(simd);
     }
     true
@@ -152,7 +152,6 @@ fn closest_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mu
 struct Together<'a, S: Simd> {
     mesh: &'a Mesh,
     common: Common<S>,
-    sure: [Sure; RAYS],
     nearest: [Nearest<'a>; RAYS],
     /// The largest t that matters to one of them.
     t_max: f32,
@@ -162,7 +161,8 @@ impl<S: Simd> bvh::Closest<S> for Together<'_, S> {
     #[inline(always)]
     fn leaf(&mut self, simd: S, leaf: u32) -> f32 {
         self.visit(simd, leaf);
-        self.t_max
+        // Nothing matters to a bundle that is given up.
+        if self.common.too_wide() { f32::NEG_INFINITY } else { self.t_max }
     }
 }
 
@@ -172,26 +172,27 @@ impl<S: Simd> Together<'_, S> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let (nearest, sure) = (&mut self.nearest, &self.sure);
+                let nearest = &mut self.nearest;
                 let mut shorter = false;
                 let leaf = &self.mesh.leaves[number as usize];
-                self.common.visit(simd, leaf, self.mesh.exact, |last, lane, group, outcome| {
+                self.common.visit(simd, leaf, self.mesh.exact, |last, lane, eight, outcome| {
                     let mut rays = outcome.maybe;
                     while rays != 0 {
                         let ray = rays.trailing_zeros() as usize & 7;
                         rays &= rays - 1;
                         let (through, depth) = (outcome.through >> ray & 1 == 1, outcome.depths.interval(ray));
-                        let at = 8 * group + ray;
-                        nearest[at].consider(simd, sure[at], [number, lane], through, depth);
-                        if nearest[at].t_max < last[ray] {
-                            last[ray] = nearest[at].t_max;
+                        let nearest = &mut nearest[eight + ray];
+                        nearest.consider(simd, [number, lane], through, depth);
+                        if nearest.t_max < last[ray] {
+                            last[ray] = nearest.t_max;
                             shorter = true;
                         }
                     }
                     true
                 });
                 if shorter {
-                    self.t_max = self.nearest.iter().fold(f32::NEG_INFINITY, |m, n| if n.t_max > m { n.t_max } else { m });
+                    let latest = |n: &Nearest| n.t_max;
+                    self.t_max = self.nearest.iter().map(latest).fold(f32::NEG_INFINITY, f32::max);
                 }
             },
         );
@@ -201,18 +202,11 @@ impl<S: Simd> Together<'_, S> {
 /// `false`, and nothing done, if the rays are no bundle.
 #[inline(always)]
 fn any_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mut [bool; RAYS]) -> bool {
-    let Some((locals, bundle)) = gather(simd, mesh, rays) else { return false };
-    let t_max = locals.iter().fold(f32::NEG_INFINITY, |m, l| m.max(l.t_max));
-    let mut walk = Until {
-        mesh,
-        rays,
-        common: Common::new(simd, mesh, &bundle, &locals),
-        sure: std::array::from_fn(|i| Sure::new(&locals[i], rays[i].1)),
-        hits,
-    };
+    let Some(bundle) = Bundle::new(simd, mesh.frame(), rays) else { return false };
+    let mut walk = Until { mesh, rays, common: Common::new(simd, &bundle), hits };
     *walk.hits = [false; RAYS];
-    bvh::any(simd, &mesh.tree, &bundle.lanes(simd), t_max, &mut walk);
-    true
+    bvh::any(simd, &mesh.tree, &bundle.lanes(simd), bundle.t_max, &mut walk);
+    !walk.common.too_wide() || !walk.hits.contains(&false)
 }
 
 /// A bundle's walk until all rays are known to hit something.
@@ -220,14 +214,13 @@ struct Until<'a, S: Simd> {
     mesh: &'a Mesh,
     rays: &'a [Stretch; RAYS],
     common: Common<S>,
-    sure: [Sure; RAYS],
     hits: &'a mut [bool; RAYS],
 }
 
 impl<S: Simd> bvh::Any<S> for Until<'_, S> {
     #[inline(always)]
     fn leaf(&mut self, simd: S, leaf: u32) -> bool {
-        self.visit(simd, leaf)
+        self.visit(simd, leaf) || self.common.too_wide()
     }
 }
 
@@ -238,21 +231,21 @@ impl<S: Simd> Until<'_, S> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let (hits, sure, given) = (&mut *self.hits, &self.sure, self.rays);
+                let (hits, given) = (&mut *self.hits, self.rays);
                 let (leaf, mesh) = (&self.mesh.leaves[leaf as usize], self.mesh);
-                self.common.visit(simd, leaf, mesh.exact, |last, lane, group, outcome| {
+                self.common.visit(simd, leaf, mesh.exact, |last, lane, eight, outcome| {
                     let mut rays = outcome.maybe;
                     while rays != 0 {
                         let ray = rays.trailing_zeros() as usize & 7;
                         rays &= rays - 1;
-                        let at = 8 * group + ray;
-                        if hits[at] {
+                        let (ref origin, within) = given[eight + ray];
+                        if hits[eight + ray] {
                             continue;
                         }
-                        let certain = outcome.through >> ray & 1 == 1 && sure[at].holds(outcome.depths.interval(ray));
-                        let (ref r, within) = given[at];
-                        if certain || occluded(simd, mesh, r, within, leaf, lane as usize) {
-                            hits[at] = true;
+                        let sure = Sure::new(Limits::PLAIN, within);
+                        let certain = outcome.through >> ray & 1 == 1 && sure.holds(outcome.depths.interval(ray));
+                        if certain || occluded(simd, mesh, origin, within, leaf, lane as usize) {
+                            hits[eight + ray] = true;
                             last[ray] = f32::NEG_INFINITY;
                         }
                     }

@@ -6,7 +6,7 @@
 
 use super::Mesh;
 use crate::Aabb;
-use crate::bvh::{self, Bundle, Frame, LocalRay, Wide};
+use crate::bvh::{self, Bundle, Frame, LocalRay, PLAIN_ERROR, Wide};
 use fearless_simd::{Simd, f32x8, prelude::*};
 use glam::DVec3;
 
@@ -115,9 +115,9 @@ pub(super) fn build(
 /// The ray as the filter wants it: in f32, with the margins' constants.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probe {
-    pub(super) origin: [f32; 4],
-    pub(super) direction: [f32; 4],
-    pub(super) margins: Margins,
+    origin: [f32; 4],
+    direction: [f32; 4],
+    margins: Margins,
     pub(super) t_min: f32,
     /// No hit has a t above this in absolute value.
     reach: f32,
@@ -135,15 +135,11 @@ pub(super) struct Margins {
     depth: f32,
 }
 
-impl Margins {
-    /// Enough for both.
-    pub(super) fn max(self, other: Self) -> Self {
-        Self {
-            edge: self.edge.max(other.edge),
-            edge2: self.edge2.max(other.edge2),
-            depth: self.depth.max(other.depth),
-        }
-    }
+/// The longest way to a triangle along one axis, from an origin with the largest coordinate `size`; its error as if it
+/// were part of that.
+#[inline(always)]
+fn steps(size: f32, origin_error: f32) -> f32 {
+    (1.0 + size) * (1.0 + 1e-5) + origin_error * (1.0 / E)
 }
 
 /// The unit roundoff of f32, 2⁻²⁴.
@@ -155,13 +151,12 @@ const UNDERFLOW: f32 = 1e-36;
 impl Probe {
     #[inline(always)]
     pub(super) fn new(ray: &LocalRay, exact: bool) -> Self {
-        // |direction| ≤ √3·length and |v₀ − o| ≤ √3(1 + size), with the origin's own error as if it were part of that.
-        let steps = (1.0 + ray.size) * (1.0 + 1e-5) + ray.origin_error * (1.0 / E);
-        let (d, r, reach) = (1.7321 * ray.length, 1.7321 * steps, steps / ray.length);
+        let steps = steps(ray.size, ray.origin_error);
+        let reach = steps / ray.length;
         Self {
             origin: ray.origin,
             direction: ray.direction,
-            margins: Margins { edge: 13.0 * E * d * r, edge2: 3.1 * E * d, depth: 6.2 * E * r },
+            margins: Margins::new(steps, ray.length),
             t_min: if ray.t_min > -reach { ray.t_min } else { -reach },
             reach,
             exact,
@@ -170,7 +165,7 @@ impl Probe {
 
     /// The later end of what matters: `t_max`, but no farther than any triangle.
     #[inline(always)]
-    pub(super) fn last(&self, t_max: f32) -> f32 {
+    fn last(&self, t_max: f32) -> f32 {
         if t_max < self.reach { t_max } else { self.reach }
     }
 
@@ -255,6 +250,14 @@ pub(super) fn filter<S: Simd>(
 }
 
 impl Margins {
+    /// For directions whose largest coordinate is at most `length`.
+    #[inline(always)]
+    fn new(steps: f32, length: f32) -> Self {
+        // |direction| ≤ √3·length, |v₀ − o| ≤ √3·steps
+        let (d, r) = (1.7321 * length, 1.7321 * steps);
+        Self { edge: 13.0 * E * d * r, edge2: 3.1 * E * d, depth: 6.2 * E * r }
+    }
+
     #[inline(always)]
     fn edges<S: Simd>(&self, simd: S, size: f32x8<S>) -> f32x8<S> {
         size.mul_add(size.mul_add(splat(simd, self.edge2), splat(simd, self.edge)), splat(simd, UNDERFLOW))
@@ -268,24 +271,29 @@ pub(super) struct Thick<S: Simd> {
     /// Largest difference of a direction, and the part of (v₀ − o) × d's difference that no triangle has a say in.
     turn: Vec8<S>,
     shift: Vec8<S>,
-    margins: Margins,
+    pub(super) margins: Margins,
+    /// No hit has a t above this in absolute value.
+    pub(super) reach: f32,
 }
 
 impl<S: Simd> Thick<S> {
     #[inline(always)]
-    pub(super) fn new(simd: S, bundle: &Bundle, margins: Margins) -> Self {
+    pub(super) fn new(simd: S, bundle: &Bundle) -> Self {
+        let steps = steps(bundle.size, PLAIN_ERROR);
         // Up by far more than the roundings of what is made of them.
         let up = 1.0 + 1e-5;
         let turn = bundle.direction_spread.map(|x| x * up);
         let moved = bundle.origin_spread.map(|x| x * up);
         let most = |i: usize| bundle.direction[i].abs() + turn[i];
         let shift = [[1, 2], [2, 0], [0, 1]].map(|[j, k]| (moved[j] * most(k) + moved[k] * most(j)) * up);
+        let everywhere = |v: [f32; 3]| v.map(|x| splat(simd, x));
         Self {
-            origin: spread(simd, &bundle.origin),
-            direction: spread(simd, &bundle.direction),
-            turn: spread(simd, &turn),
-            shift: shift.map(|x| splat(simd, x)),
-            margins,
+            origin: everywhere(bundle.origin),
+            direction: everywhere(bundle.direction),
+            turn: everywhere(turn),
+            shift: everywhere(shift),
+            margins: Margins::new(steps, bundle.lengths[1]),
+            reach: steps / bundle.lengths[0],
         }
     }
 

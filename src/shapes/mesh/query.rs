@@ -2,7 +2,7 @@
 
 use super::Mesh;
 use super::leaf::{Leaf, Outcome, Probe};
-use crate::bvh::{self, Lanes, LocalRay};
+use crate::bvh::{self, Lanes, Limits, LocalRay};
 use crate::kernel::eft::{Fused, Split};
 use crate::kernel::triangle;
 use crate::{Hit, Interval, Ray};
@@ -19,7 +19,7 @@ pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
 fn closest_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
     let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else { return closest_of_all(mesh, ray, within) };
     let mut walk =
-        Single { probe: Probe::new(&local, mesh.exact), nearest: Nearest::new(mesh, ray, within, &local) };
+        Single { probe: Probe::new(&local, mesh.exact), nearest: Nearest::new(mesh, ray, within, local.limits, local.t_max) };
     bvh::closest(simd, &mesh.tree, &Lanes::new(simd, &local), local.t_max, &mut walk);
     walk.nearest.settle(simd)
 }
@@ -93,8 +93,8 @@ pub(super) struct Sure {
 
 impl Sure {
     #[inline(always)]
-    pub(super) fn new(local: &LocalRay, within: Interval) -> Self {
-        Self { min: local.upper(within.min), max: local.lower(within.max) }
+    pub(super) fn new(limits: Limits, within: Interval) -> Self {
+        Self { min: limits.upper(within.min), max: limits.lower(within.max) }
     }
 
     /// Whether a t between these is inside for certain; not if one is NaN.
@@ -120,7 +120,7 @@ pub(super) struct Nearest<'a> {
     mesh: &'a Mesh,
     ray: &'a Ray,
     within: Interval,
-    local: &'a LocalRay,
+    limits: Limits,
     pub(super) t_max: f32,
     passed: [Passed; MOST_PASSED],
     count: usize,
@@ -129,14 +129,14 @@ pub(super) struct Nearest<'a> {
 
 impl<'a> Nearest<'a> {
     #[inline(always)]
-    pub(super) fn new(mesh: &'a Mesh, ray: &'a Ray, within: Interval, local: &'a LocalRay) -> Self {
+    pub(super) fn new(mesh: &'a Mesh, ray: &'a Ray, within: Interval, limits: Limits, t_max: f32) -> Self {
         let passed = [Passed { leaf: 0, lane: 0, t: 0.0 }; MOST_PASSED];
-        Self { mesh, ray, within, local, t_max: local.t_max, passed, count: 0, best: None }
+        Self { mesh, ray, within, limits, t_max, passed, count: 0, best: None }
     }
 
     /// The answer.
     #[inline(always)]
-    pub(super) fn settle<S: Simd>(mut self, simd: S) -> Option<Hit> {
+    pub(super) fn settle<S: Simd>(&mut self, simd: S) -> Option<Hit> {
         if self.count > 0 {
             self.decide(simd);
         }
@@ -148,7 +148,6 @@ impl<'a> Nearest<'a> {
     pub(super) fn consider<S: Simd>(
         &mut self,
         simd: S,
-        sure: Sure,
         [leaf, lane]: [u32; 2],
         through: bool,
         (low, high): (f32, f32),
@@ -157,7 +156,7 @@ impl<'a> Nearest<'a> {
         if through && low > self.t_max {
             return;
         }
-        if !(through && sure.holds((low, high))) {
+        if !(through && Sure::new(self.limits, self.within).holds((low, high))) {
             return self.confirm(simd, leaf, lane);
         }
         if high < self.t_max {
@@ -192,7 +191,7 @@ impl<'a> Nearest<'a> {
                 let hit = Hit { part: leaf.number(lane as usize & 7), ..hit };
                 let best = nearer(self.mesh, self.ray, self.best, hit);
                 self.best = Some(best);
-                let t = self.local.upper(best.lambda + best.error);
+                let t = self.limits.upper(best.lambda + best.error);
                 if t < self.t_max {
                     self.t_max = t;
                 }
@@ -232,13 +231,12 @@ impl Single<'_> {
 
     #[inline(never)]
     fn candidates<S: Simd>(&mut self, simd: S, leaf: u32, outcome: &Outcome) {
-        let sure = Sure::new(self.nearest.local, self.nearest.within);
         let mut lanes = outcome.maybe;
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
             let through = outcome.through >> lane & 1 == 1;
-            self.nearest.consider(simd, sure, [leaf, lane], through, outcome.depths.interval(lane as usize));
+            self.nearest.consider(simd, [leaf, lane], through, outcome.depths.interval(lane as usize));
         }
     }
 }
@@ -274,7 +272,7 @@ impl First<'_> {
     #[inline(never)]
     fn candidates<S: Simd>(&self, simd: S, leaf: &Leaf, outcome: &Outcome) -> bool {
         let &Outcome { maybe: lanes, through, ref depths } = outcome;
-        let sure = Sure::new(self.local, self.within);
+        let sure = Sure::new(self.local.limits, self.within);
         let each = |lanes: u32| (0..8).filter(move |lane| lanes >> lane & 1 == 1);
         each(lanes & through).any(|lane| sure.holds(depths.interval(lane)))
             || each(lanes).any(|lane| occluded(simd, self.mesh, self.ray, self.within, leaf, lane))
