@@ -111,6 +111,63 @@ fn answers_are_those_of_a_loop() {
     assert!(hits > rays / 4, "{hits} of {rays}");
 }
 
+/// Tiles of a camera's rays at a point of the mesh, some exactly at a vertex, a few of them spoiled.
+fn tile(mesh: &Mesh, random: &mut Random) -> Vec<(Ray, Interval)> {
+    let size = mesh.bounds().size().length();
+    let corners = mesh.vertices(random.below(mesh.triangles().len()) as u32);
+    let target = corners[random.below(3)];
+    let eye = mesh.bounds().center() + (0.2 + random.unit()) * size * random.direction();
+    let step = (target - eye).length() * 0.1f64.powi(1 + random.below(4) as i32);
+    let (right, up) = (step * random.direction(), step * random.direction());
+    let spoiled = random.below(6);
+    let to_light = random.below(3) == 0;
+    (0..48)
+        .map(|i| {
+            let (x, y) = (f64::from(i % 4) - 1.0, f64::from(i / 4 % 4) - 1.0);
+            let at = target + x * right + y * up;
+            let ray = if to_light { Ray::new(at, eye - at) } else { Ray::new(eye, at - eye) };
+            let within = if to_light { Interval::new(0.0, 1.0) } else { Interval::FORWARD };
+            match (spoiled, i) {
+                (0, 20) => (Ray::new(ray.origin, -ray.direction), within),
+                (1, 21) => (Ray::new(ray.origin, DVec3::NAN), within),
+                (2, 22) => (ray, Interval::new(1.0, 1.0)),
+                (3, 23) => (Ray::new(1e9 * ray.origin, ray.direction), within),
+                (4, _) => (ray, Interval::new(0.0, 0.9 + 0.01 * f64::from(i))),
+                _ => (ray, within),
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn slices_are_answered_as_their_rays_are() {
+    let mut random = Random(21);
+    let (mut rays_in_all, mut hits_in_all) = (0, 0);
+    let meshes = [icosphere(3), torus(30), grid_cube(6), soup(&mut Random(22), 500, 0.2), icosphere(5)];
+    let far = moved(torus(12), 1e-3, DVec3::new(1e5, 2e5, -3e5));
+    for (positions, triangles) in meshes.into_iter().chain([far]) {
+        let mut mesh = Mesh::new(positions, triangles).unwrap();
+        for _ in 0..400 {
+            let rays = tile(&mesh, &mut random);
+            let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
+            for (level, simd) in Level::all() {
+                mesh.set_level(simd);
+                mesh.intersect_each(&rays, &mut hits);
+                mesh.occludes_each(&rays, &mut occluded);
+                for (i, (ray, within)) in rays.iter().enumerate() {
+                    let alone = mesh.intersect(ray, *within);
+                    assert_eq!(hits[i], alone, "{level}: ray {i}, {ray:?} {within:?}");
+                    assert_eq!(occluded[i], alone.is_some(), "{level}: ray {i}, {ray:?} {within:?}");
+                }
+            }
+            rays_in_all += rays.len();
+            hits_in_all += hits.iter().flatten().count();
+        }
+    }
+    println!("{rays_in_all} rays in slices, {hits_in_all} hits, {} levels, 0 differences", Level::all().len());
+    assert!(hits_in_all > rays_in_all / 2);
+}
+
 #[test]
 fn degenerate_meshes_answer_too() {
     let mut random = Random(3);

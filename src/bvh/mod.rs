@@ -106,7 +106,13 @@ impl Bvh {
     fn closest_with<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, visit: &mut impl FnMut(u32, f64) -> f64) {
         let mut bound = within.max;
         if let Some(local) = LocalRay::new(simd, &self.tree.frame, ray, within) {
-            closest(simd, &self.tree, &Lanes::new(simd, &local), local.t_max, &mut Nearest { bvh: self, local: &local, bound, visit });
+            closest(
+                simd,
+                &self.tree,
+                &Lanes::new(simd, &local),
+                local.t_max,
+                &mut Nearest { bvh: self, local: &local, bound, visit },
+            );
         } else if !within.is_empty() && ray.is_valid() {
             // No place in the frame: every object.
             for &object in &self.objects {

@@ -110,7 +110,6 @@ impl<S: Simd> Lanes<S> {
             near: [ray.away & 1, 2 + (ray.away >> 1 & 1), 4 + (ray.away >> 2 & 1)],
         }
     }
-
 }
 
 impl<S: Simd> Beam<S> for Lanes<S> {
@@ -148,7 +147,13 @@ pub(crate) trait Any<S: Simd> {
 
 /// Visits the leaves whose boxes `beam` meets before `t_max`, nearest first.
 #[inline(always)]
-pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, beam: &impl Beam<S>, mut t_max: f32, leaves: &mut impl Closest<S>) {
+pub(crate) fn closest<S: Simd>(
+    simd: S,
+    tree: &Wide,
+    beam: &impl Beam<S>,
+    mut t_max: f32,
+    leaves: &mut impl Closest<S>,
+) {
     let nodes = &tree.nodes[..];
     let mut stack = Stack::new();
     let mut at = 0u32;

@@ -18,8 +18,10 @@ pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
 #[inline(always)]
 fn closest_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
     let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else { return closest_of_all(mesh, ray, within) };
-    let mut walk =
-        Single { probe: Probe::new(&local, mesh.exact), nearest: Nearest::new(mesh, ray, within, local.limits, local.t_max) };
+    let mut walk = Single {
+        probe: Probe::new(&local, mesh.exact),
+        nearest: Nearest::new(mesh, ray, within, local.limits, local.t_max),
+    };
     bvh::closest(simd, &mesh.tree, &Lanes::new(simd, &local), local.t_max, &mut walk);
     walk.nearest.settle(simd)
 }
@@ -281,14 +283,7 @@ impl First<'_> {
 
 /// Whether a triangle is hit, exactly.
 #[inline(never)]
-pub(super) fn occluded<S: Simd>(
-    simd: S,
-    mesh: &Mesh,
-    ray: &Ray,
-    within: Interval,
-    leaf: &Leaf,
-    lane: usize,
-) -> bool {
+pub(super) fn occluded<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval, leaf: &Leaf, lane: usize) -> bool {
     simd.vectorize(
         #[inline(always)]
         || confirm(simd, ray, &leaf.vertices(lane & 7, mesh), within).is_some(),

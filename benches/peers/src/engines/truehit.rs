@@ -36,24 +36,28 @@ fn as_found(hit: Option<Hit>) -> Found {
     hit.map_or(Found::MISS, |hit| Found { triangle: hit.part, lambda: hit.lambda })
 }
 
-/// All rays in one call.
+/// Some thousand rays a call, so that answers are read while they are in the cache.
 pub struct Slices {
     mesh: truehit::Mesh,
     hits: Vec<Option<Hit>>,
 }
 
+const RAYS_A_CALL: usize = 4096;
+
 impl Slices {
     pub fn new(source: &Mesh) -> Self {
-        Self { mesh: build(source), hits: Vec::new() }
+        Self { mesh: build(source), hits: vec![None; RAYS_A_CALL] }
     }
 }
 
 impl Engine for Slices {
     fn closest(&mut self, set: &RaySet, found: &mut [Found]) {
-        self.hits.resize(set.double.len(), None);
-        self.mesh.intersect_each(&set.double, &mut self.hits);
-        for (hit, found) in self.hits.iter().zip(found) {
-            *found = as_found(*hit);
+        for (rays, found) in set.double.chunks(RAYS_A_CALL).zip(found.chunks_mut(RAYS_A_CALL)) {
+            let hits = &mut self.hits[..rays.len()];
+            self.mesh.intersect_each(rays, hits);
+            for (hit, found) in hits.iter().zip(found) {
+                *found = as_found(*hit);
+            }
         }
     }
 
