@@ -244,6 +244,29 @@ fn identical_centroids_and_deep_trees_end() {
     assert!(hits > 100);
 }
 
+#[test]
+fn boxes_of_images_hold_the_vertices() {
+    let mut random = Random(31);
+    let (mut tightest, mut loosest) = (f64::INFINITY, 0.0f64);
+    for offset in [0.0, 1.0, 1e6] {
+        let (positions, triangles) = moved(torus(20), 0.7, offset * random.in_cube());
+        let mesh = Mesh::new(positions, triangles).unwrap();
+        for _ in 0..200 {
+            let mut column = || random.in_cube();
+            let map = glam::DAffine3::from_cols(column(), column(), column(), column());
+            let (whole, exact) = (mesh.bounds_under(&map), truehit::Aabb::around_images(mesh.positions(), &map));
+            for &p in mesh.positions() {
+                let p = map.transform_point3(p);
+                assert!(whole.min.cmple(p).all() && whole.max.cmpge(p).all());
+            }
+            let ratio = (whole.size() / exact.size()).max_element();
+            (tightest, loosest) = (tightest.min(ratio), loosest.max(ratio));
+        }
+    }
+    println!("boxes of a torus' images are {tightest:.2} to {loosest:.2} times the least");
+    assert!(loosest < 1.8);
+}
+
 /// Rays from inside a closed mesh at its vertices, edges and faces: all must hit. (rays, leaks)
 fn leaks(parts: &Parts, inside: DVec3, rays: usize, random: &mut Random) -> (usize, usize) {
     let mesh = Mesh::new(parts.0.clone(), parts.1.clone()).unwrap();

@@ -64,6 +64,17 @@ impl Frame {
         (a - b) * self.scale
     }
 
+    /// The box around what lies in an f32 box of the frame.
+    pub(crate) fn back(&self, min: [f32; 3], max: [f32; 3]) -> Aabb {
+        let world = |v: [f32; 3]| self.world(DVec3::from(v.map(f64::from)));
+        // The addition's rounding; exact about the origin.
+        let slack = |v: DVec3| {
+            if self.center == DVec3::ZERO { DVec3::ZERO } else { f64::EPSILON * (v.abs() + self.center.abs()) }
+        };
+        let (min, max) = (world(min), world(max));
+        Aabb { min: min - slack(min), max: max + slack(max) }
+    }
+
     /// The f32 box around the box `b`: infinite if `b` is not finite, or not a box.
     pub(crate) fn outward(&self, b: &Aabb) -> ([f32; 3], [f32; 3]) {
         if b.is_empty() || !b.is_finite() {

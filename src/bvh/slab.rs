@@ -96,7 +96,7 @@ impl LocalRay {
             (origin, direction) = placed.narrowed();
             length = direction.abs().reduce_max();
         }
-        if !(within.min < within.max) {
+        if within.is_empty() {
             return None;
         }
         let one = f32x4::splat(simd, 1.0);

@@ -228,7 +228,7 @@ pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, beam: &impl Beam<S>, t_max: f32
                 stack.reserve();
             }
             while hits != 0 {
-                let i = 31 - hits.leading_zeros();
+                let i = hits.ilog2();
                 hits &= !(1 << i);
                 stack.push(u64::from(node.child(i as usize)));
             }

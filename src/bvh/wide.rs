@@ -1,6 +1,7 @@
 //! Nodes of eight children.
 
 use super::frame::Frame;
+use crate::Aabb;
 use fearless_simd::{Simd, f32x8, prelude::*};
 
 /// Eight children, 256 bytes, four cache lines.
@@ -58,6 +59,15 @@ pub(crate) struct Wide {
 }
 
 impl Wide {
+    /// Boxes, eight at most, that hold everything in the tree.
+    pub(crate) fn boxes(&self) -> impl Iterator<Item = Aabb> {
+        let root = &self.nodes[0];
+        (0..8).filter(|&lane| root.child(lane) != NONE).map(|lane| {
+            let plane = |end: usize| [0, 2, 4].map(|row| root.rows[row + end][lane]);
+            self.frame.back(plane(0), plane(1))
+        })
+    }
+
     pub(crate) fn memory(&self) -> usize {
         self.nodes.capacity() * size_of::<WideNode>()
     }

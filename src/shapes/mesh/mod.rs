@@ -227,7 +227,12 @@ impl Shape for Mesh {
     }
 
     fn bounds_under(&self, map: &DAffine3) -> Aabb {
-        Aabb::around_images(&self.positions, map)
+        // A million instances of a large mesh must not read all of it each.
+        const FEW: usize = 64;
+        if self.positions.len() <= FEW || !self.frame().unscale.is_finite() {
+            return Aabb::around_images(&self.positions, map);
+        }
+        self.tree.boxes().fold(Aabb::EMPTY, |b, part| b.union(part.image(map)))
     }
 
     fn occludes(&self, ray: &Ray, within: Interval) -> bool {
