@@ -22,7 +22,7 @@ fn family(number: u32) -> Family {
 fn decisions_are_exact_for_the_object_ray() {
     for number in [0, 1, 66, 67, 68, 70, 71, 72, 73, 85] {
         let (mut hits, mut differ) = (0, 0);
-        for i in 0..1500 {
+        for i in 0..600 {
             let case = as_stored(family(number).case(i));
             let affine = shape(&case.solid).unwrap().unwrap();
             let answer = affine.intersect(&case.ray, case.within);
@@ -33,7 +33,7 @@ fn decisions_are_exact_for_the_object_ray() {
             differ += usize::from(answer.is_some() != truth(&case).is_some());
         }
         println!("{number}: {hits} hits, {differ} otherwise than the exact image");
-        assert!(hits > 400);
+        assert!(hits > 150);
         assert_eq!(differ > 0, number == 1, "only rays that graze");
     }
 }
@@ -43,7 +43,7 @@ fn decisions_are_exact_for_the_object_ray() {
 #[test]
 fn limits_are_compared_with_the_exact_images_lambda() {
     let (mut hits, mut flipped) = (0, 0);
-    for i in 0..8000 {
+    for i in 0..2500 {
         let mut case = as_stored(family(46).case(i));
         let check = |case: &Case| {
             let affine = shape(&case.solid).unwrap().unwrap();
@@ -74,7 +74,35 @@ fn limits_are_compared_with_the_exact_images_lambda() {
         flipped += usize::from(check(&case).1);
     }
     println!("{hits} hits; the rounded image alone would have answered {flipped} otherwise");
-    assert!(hits > 4000 && flipped > 400);
+    assert!(hits > 1200 && flipped > 120);
+}
+
+/// Kept: two rays that start on the surface of which the rounded image alone would have answered with the other end, and
+/// one that hardly leaves it: λ = 1.3e-12 where the rounded image's is 2.6e-12.
+const STARTS_ON_THE_SURFACE: [&str; 3] = [
+    "origin [-0x1.26900d4be46b6p0, 0x1.ce2d2e3803606p1, 0x1.209ec15603da0p0] direction [-0x1.ad203d5bdf893p-6, -0x1.7eb21123d6258p-7, -0x1.83d0128a22f30p-3] within (0.0, inf) affine [-0x1.37294b56d4900p-2, 0x1.4ef93fd68592ap0, -0x1.b4fc8b7722864p0] [0x1.e222d45eaccfcp-3, 0x1.070326fd69f0cp-1, 0x1.4dd3f6e083e0ap-3] [0x1.025ead62675b7p-2, -0x1.22f5efd2a3c02p0, -0x1.7c800179160e7p-2] [-0x1.7fc5b466ecf96p-1, 0x1.8c55e41128e3cp-1, -0x1.decbf3925f2b4p0] sphere [-0x1.3a435d64f6712p1, 0x1.07167dc7568f2p1, -0x1.4d2829f592a20p1] 0x1.18a31adcf8575p1",
+    "origin [-0x1.4f5dcf7340808p-2, -0x1.cf1083f8719bep-1, -0x1.5775e34db830ap1] direction [-0x1.fdf89538c3917p2, -0x1.3de06ecfa15e6p2, 0x1.1602bf8158644p-1] within (0.0, inf) affine [0x1.5385ba2e5177dp0, 0x1.3b8134c1d04d3p-1, 0x1.688b94d1c62e8p-2] [0x1.1099aac4fde80p-8, -0x1.5d4640d71654ep-1, 0x1.bddfbd3d981cdp-3] [0x1.af8871e0308d3p-2, -0x1.04a99d01cdef0p-1, -0x1.e1a0ba00ace51p-2] [0x1.ef58e58161960p0, 0x1.cf64bec4682f4p-1, 0x1.289e2482fae40p0] sphere [-0x1.7d8b290189ab8p1, -0x1.9ce7e1ae03102p1, 0x1.0c0d15a469870p2] 0x1.9a1a2aa534046p-3",
+    "origin [-0x1.8e84a3678707dp2, -0x1.2479fb5389529p2, -0x1.6840ef29537a1p0] direction [-0x1.a0f4b29d91c77p-2, 0x1.9f3a1680f0f70p-2, -0x1.4b0b49988a312p-1] within (0.0, inf) affine [0x1.817aa9c4e0f34p0, -0x1.40f1a4f8fcab2p0, -0x1.4d9cf19b38e60p-4] [-0x1.e7471fc9002b0p-3, -0x1.265cafa1982d6p-2, -0x1.c73d55392b4d8p0] [0x1.472fcd5f3a2e3p0, 0x1.499032eccd1a0p0, -0x1.c4e32dc873217p-2] [-0x1.118d20a42c5c7p0, -0x1.117746fb30c7cp0, 0x1.51c7187df3089p0] sphere [0x1.b4c405b3340e0p-3, 0x1.4adf15afd2710p1, -0x1.5ea0f626d423ep0] 0x1.bd57ac08f1c9bp0",
+];
+
+#[test]
+fn counter_examples_stay_right() {
+    for text in STARTS_ON_THE_SURFACE {
+        let case = as_stored(Case::from_hex(text));
+        assert_eq!(case.hex(), text);
+        let affine = shape(&case.solid).unwrap().unwrap();
+        let (exact, answer) = (truth(&case), affine.intersect(&case.ray, case.within));
+        let (inner, ..) = innermost(&case);
+        let rounded = solid(inner, &Line::from(&object_ray(&case)), case.within);
+        let rounded = rounded.map(|t| t.lambda.enclosure().to_f64());
+        println!("exact {:?}, rounded image {rounded:?}", exact.as_ref().map(|t| t.lambda.enclosure().to_f64()));
+        assert_eq!(answer.is_some(), exact.is_some());
+        if let (Some(exact), Some(hit)) = (exact, answer) {
+            assert!(!measure(&hit, &exact.lambda.enclosure(), scale(&case)).violated);
+            // And the rounded image's own λ is not within it.
+            assert!(rounded.is_none_or(|r| (r - hit.lambda).abs() > hit.error));
+        }
+    }
 }
 
 /// Counts what is asked of it.
@@ -159,7 +187,7 @@ fn a_chains_box_is_tight() {
 fn a_chains_bound_holds_where_its_maps_all_but_cancel() {
     let mut rng = Rng::new(20);
     let (mut hits, mut worst) = (0, 0.0f64);
-    for _ in 0..1500 {
+    for _ in 0..400 {
         let mut solid = Solid::Sphere { center: rng.in_cube(1.0), radius: rng.log(0.3, 2.0) };
         let (mut map, mut maps) = (DAffine3::IDENTITY, Vec::new());
         for _ in 0..10 {
@@ -187,5 +215,5 @@ fn a_chains_bound_holds_where_its_maps_all_but_cancel() {
         }
     }
     println!("{hits} hits, at most {worst:.3} ulp");
-    assert!(hits > 500 && worst <= 4.0);
+    assert!(hits > 130 && worst <= 4.0);
 }

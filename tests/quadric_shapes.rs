@@ -206,6 +206,8 @@ fn exact_wall_normal(case: &Case, lambda: &Big) -> Option<DVec3> {
     Some((h2.to_f64().sqrt() * radial - (top_radius - base_radius) * axis.direction()?).normalize())
 }
 
+const NEXT_TO_THE_APEX: &str = "origin [0x1.8000000000000p0, -0x1.0000000000000p2, -0x1.a789dd69b611dp0] direction [-0x1.8000000000000p1, 0x1.0000000000000p3, 0x1.a000000000000p2] within (0.0, inf) frustum [0.0, 0.0, 0.0] [0.0, 0.0, 0x1.9876229649ee4p0] 0x1.8e2983c228785p-1 0.0";
+
 #[test]
 fn wall_normals_are_within_their_bound_of_the_exact_ones_next_to_the_apex_too() {
     let (mut walls, mut worst, mut furthest) = (0, 0.0f64, 0.0f64);
@@ -240,6 +242,12 @@ fn wall_normals_are_within_their_bound_of_the_exact_ones_next_to_the_apex_too() 
         }
         walls += of_family;
     }
+    // Met an ulp below its apex: the ends of the section are within an ulp of each other, on opposite sides.
+    let case = Case::from_hex(NEXT_TO_THE_APEX);
+    let shape = shape(&case.solid).unwrap().unwrap();
+    let (truth, hit) = (truth(&case).unwrap(), shape.intersect(&case.ray, case.within).unwrap());
+    let exact = exact_wall_normal(&case, &truth.lambda.enclosure().lo).unwrap();
+    assert!((shape.normal(&case.ray, &hit) - exact).length() < 1e-11);
     println!("{walls} wall normals, off by at most {worst:.2} of their bound, {furthest:e}");
     assert!(walls > 8000);
     // A cone's apex from 1e-3 down to 1e-14 of its size away: as accurate as anywhere.

@@ -1,7 +1,7 @@
 //! The scene's own promises, on a user's shape: nearest, ties, odd boxes, emptiness.
 
 use truehit::glam::{DVec2, DVec3};
-use truehit::{Aabb, Hit, Interval, Ray, Scene, Shape};
+use truehit::{Aabb, Hit, Interval, Plane, Ray, Scene, Shape};
 
 /// The plane z = `z`, as a user might write it: it claims `error`, and knows its λ to `low` more.
 #[derive(Debug)]
@@ -57,6 +57,16 @@ fn an_empty_scene_is_legal_and_everything_misses() {
     assert!(scene.bounds().is_empty());
     assert_eq!(scene.intersect(&DOWN, Interval::FORWARD), None);
     assert!(!scene.occludes(&DOWN, Interval::FORWARD));
+}
+
+#[test]
+fn one_unbounded_plane_is_a_scene() {
+    let mut builder = Scene::builder();
+    builder.push(Plane::new([0.0, 0.0, -2.0], [0.0, 0.0, 1.0]).unwrap(), ());
+    let scene = builder.build();
+    assert!(!scene.bounds().is_finite());
+    assert_eq!(scene.intersect(&DOWN, Interval::FORWARD).map(|found| found.hit.lambda), Some(2.0));
+    assert!(scene.occludes(&DOWN, Interval::FORWARD) && !scene.occludes(&DOWN, Interval::new(0.0, 2.0)));
 }
 
 #[test]

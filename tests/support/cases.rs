@@ -1,7 +1,7 @@
 //! A case: a ray, an interval, a shape; and the families they come in.
 
 use super::rng::Rng;
-use truehit::glam::{DAffine3, DVec3};
+use truehit::glam::{DAffine3, DMat3, DVec3};
 use truehit::{Interval, Ray};
 
 #[derive(Clone, Debug)]
@@ -52,27 +52,94 @@ impl Case {
         Self { ray: Ray { origin, direction }, within: Interval::FORWARD, solid }
     }
 
-    /// All of it in hexadecimal floats, to be pasted into a test.
+    /// All of it in hexadecimal floats, to be pasted into a test; [`from_hex`](Self::from_hex) reads it.
     pub fn hex(&self) -> String {
-        let v = |v: DVec3| format!("[{}, {}, {}]", hex(v.x), hex(v.y), hex(v.z));
-        let shape = match &self.solid {
-            Solid::Plane { point, normal } => format!("plane {} {}", v(*point), v(*normal)),
-            Solid::Triangle(t) => format!("triangle {} {} {}", v(t[0]), v(t[1]), v(t[2])),
-            Solid::Sphere { center, radius } => format!("sphere {} {}", v(*center), hex(*radius)),
-            Solid::Frustum { base, top, base_radius, top_radius } => {
-                format!("frustum {} {} {} {}", v(*base), v(*top), hex(*base_radius), hex(*top_radius))
-            }
-            Solid::Slab { min, max } => format!("slab {} {}", v(*min), v(*max)),
-            other => format!("{other:?}"),
-        };
         format!(
-            "origin {} direction {} within ({}, {}) {shape}",
-            v(self.ray.origin),
-            v(self.ray.direction),
+            "origin {} direction {} within ({}, {}) {}",
+            hex_vector(self.ray.origin),
+            hex_vector(self.ray.direction),
             hex(self.within.min),
-            hex(self.within.max)
+            hex(self.within.max),
+            self.solid.hex()
         )
     }
+
+    /// What [`hex`](Self::hex) wrote.
+    pub fn from_hex(text: &str) -> Self {
+        let mut words = text.split(|c: char| c.is_whitespace() || "[](),".contains(c)).filter(|w| !w.is_empty());
+        let (_, origin) = (words.find(|&w| w == "origin"), vector(&mut words));
+        let (_, direction) = (words.next(), vector(&mut words));
+        let (_, min, max) = (words.next(), number(&mut words), number(&mut words));
+        Self { ray: Ray { origin, direction }, within: Interval::new(min, max), solid: Solid::from_hex(&mut words) }
+    }
+}
+
+impl Solid {
+    fn hex(&self) -> String {
+        let v = hex_vector;
+        match self {
+            Self::Plane { point, normal } => format!("plane {} {}", v(*point), v(*normal)),
+            Self::Triangle(t) => format!("triangle {} {} {}", v(t[0]), v(t[1]), v(t[2])),
+            Self::Sphere { center, radius } => format!("sphere {} {}", v(*center), hex(*radius)),
+            Self::Frustum { base, top, base_radius, top_radius } => {
+                format!("frustum {} {} {} {}", v(*base), v(*top), hex(*base_radius), hex(*top_radius))
+            }
+            Self::Slab { min, max } => format!("slab {} {}", v(*min), v(*max)),
+            Self::Affine { world_from_object: DAffine3 { matrix3: m, translation }, inner, .. } => {
+                format!("affine {} {} {} {} {}", v(m.x_axis), v(m.y_axis), v(m.z_axis), v(*translation), inner.hex())
+            }
+            other => format!("{other:?}"),
+        }
+    }
+
+    fn from_hex<'a>(words: &mut impl Iterator<Item = &'a str>) -> Self {
+        match words.next().expect("a shape") {
+            "plane" => Self::Plane { point: vector(words), normal: vector(words) },
+            "triangle" => Self::Triangle([vector(words), vector(words), vector(words)]),
+            "sphere" => Self::Sphere { center: vector(words), radius: number(words) },
+            "frustum" => Self::Frustum {
+                base: vector(words),
+                top: vector(words),
+                base_radius: number(words),
+                top_radius: number(words),
+            },
+            "slab" => Self::Slab { min: vector(words), max: vector(words) },
+            "affine" => {
+                let matrix3 = DMat3::from_cols(vector(words), vector(words), vector(words));
+                let world_from_object = DAffine3 { matrix3, translation: vector(words) };
+                // What a shape stores is asked of the shape: `shapes::as_stored`.
+                let object_from_world = DAffine3::IDENTITY;
+                Self::Affine { world_from_object, object_from_world, inner: Box::new(Self::from_hex(words)) }
+            }
+            other => panic!("no shape: {other}"),
+        }
+    }
+}
+
+fn vector<'a>(words: &mut impl Iterator<Item = &'a str>) -> DVec3 {
+    DVec3::new(number(words), number(words), number(words))
+}
+
+fn number<'a>(words: &mut impl Iterator<Item = &'a str>) -> f64 {
+    from_hex(words.next().expect("a number"))
+}
+
+fn hex_vector(v: DVec3) -> String {
+    format!("[{}, {}, {}]", hex(v.x), hex(v.y), hex(v.z))
+}
+
+/// A float as [`hex`] writes it: C's %a, or `inf`, `0.0` and their negatives.
+pub fn from_hex(text: &str) -> f64 {
+    let (sign, digits) = text.strip_prefix('-').map_or((1.0, text), |t| (-1.0, t));
+    let Some(hex) = digits.strip_prefix("0x") else {
+        return sign * digits.parse::<f64>().unwrap();
+    };
+    let (mantissa, exponent) = hex.split_once('p').unwrap();
+    let (lead, fraction) = mantissa.split_once('.').unwrap();
+    let fraction = u64::from_str_radix(fraction, 16).unwrap();
+    let exponent: i64 = exponent.parse().unwrap();
+    let field = if lead == "1" { (exponent + 1023) as u64 } else { 0 };
+    sign * f64::from_bits(field << 52 | fraction)
 }
 
 /// A float as C's %a writes it.
