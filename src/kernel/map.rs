@@ -134,19 +134,22 @@ impl Map {
         if poor && ray.is_valid() { self.exact_image(ray).unwrap_or(image) } else { image }
     }
 
+    /// No closures: what is not inlined would be compiled without the instructions that `P` needs.
     #[inline(always)]
     fn image_with<P: Product>(&self, ray: &Ray) -> Image {
-        let row = |i: usize, v: DVec3, t: [f64; 2]| {
-            let (m, low) = (&self.leading.matrix3, &self.low.matrix3);
-            let low = (low.x_axis[i] * v.x + low.y_axis[i] * v.y) + (low.z_axis[i] * v.z + t[1]);
-            sum::<P>([m.x_axis[i], m.y_axis[i], m.z_axis[i]], v, t[0], low)
-        };
-        let (t, t_low) = (self.leading.translation, self.low.translation);
+        let (o, d, t, t_low) = (ray.origin, ray.direction, self.leading.translation, self.low.translation);
         Image::new(
-            [0, 1, 2].map(|i| row(i, ray.origin, [t[i], t_low[i]])),
-            [0, 1, 2].map(|i| row(i, ray.direction, [0.0; 2])),
+            [self.row::<P>(0, o, t.x, t_low.x), self.row::<P>(1, o, t.y, t_low.y), self.row::<P>(2, o, t.z, t_low.z)],
+            [self.row::<P>(0, d, 0.0, 0.0), self.row::<P>(1, d, 0.0, 0.0), self.row::<P>(2, d, 0.0, 0.0)],
             self.unknown(ray),
         )
+    }
+
+    #[inline(always)]
+    fn row<P: Product>(&self, i: usize, v: DVec3, t: f64, t_low: f64) -> (f64, f64, f64) {
+        let (m, low) = (&self.leading.matrix3, &self.low.matrix3);
+        let low = (low.x_axis[i] * v.x + low.y_axis[i] * v.y) + (low.z_axis[i] * v.z + t_low);
+        sum::<P>([m.x_axis[i], m.y_axis[i], m.z_axis[i]], v, t, low)
     }
 
     /// By how much not knowing the chain's entries moves origin and direction (|·|₁).
@@ -206,13 +209,13 @@ impl Image {
     #[inline(always)]
     fn new(o: [(f64, f64, f64); 3], d: [(f64, f64, f64); 3], unknown: [f64; 2]) -> Self {
         // Products and their errors may have underflowed.
-        let left_out = |v: &[(f64, f64, f64); 3]| (v[0].2 + v[1].2 + v[2].2) + 64.0 * f64::from_bits(1);
+        let underflow = 64.0 * f64::from_bits(1);
         Self {
             ray: Ray { origin: DVec3::new(o[0].0, o[1].0, o[2].0), direction: DVec3::new(d[0].0, d[1].0, d[2].0) },
             origin_low: DVec3::new(o[0].1, o[1].1, o[2].1),
             direction_low: DVec3::new(d[0].1, d[1].1, d[2].1),
-            origin_error: left_out(&o) + unknown[0],
-            direction_error: left_out(&d) + unknown[1],
+            origin_error: (o[0].2 + o[1].2 + o[2].2) + underflow + unknown[0],
+            direction_error: (d[0].2 + d[1].2 + d[2].2) + underflow + unknown[1],
         }
     }
 }
