@@ -91,6 +91,17 @@ fn traversal(c: &mut Criterion) {
                 });
             });
         }
+        mesh.set_level(Level::detect());
+        let (mut nearest, mut occluded) = (vec![None; set.rays.len()], vec![false; set.rays.len()]);
+        group.bench_function("in one call", |b| {
+            b.iter(|| {
+                if set.any {
+                    mesh.occludes_each(black_box(&set.rays), &mut occluded);
+                } else {
+                    mesh.intersect_each(black_box(&set.rays), &mut nearest);
+                }
+            });
+        });
         group.finish();
     }
 }

@@ -61,6 +61,11 @@ pub(crate) struct Bundle {
     pub(crate) lengths: [f32; 2],
 }
 
+#[inline(always)]
+fn pair<S: Simd>(simd: S, a: &[f32; 8], b: &[f32; 8]) -> [f32x8<S>; 2] {
+    [f32x8::simd_from(simd, *a), f32x8::simd_from(simd, *b)]
+}
+
 /// The least and the greatest of all lanes of two vectors.
 #[inline(always)]
 fn range<S: Simd>([a, b]: [f32x8<S>; 2]) -> [f32; 2] {
@@ -85,16 +90,27 @@ impl Bundle {
             (eight.t_min[lane], eight.t_max[lane]) = (Limits::PLAIN.lower(within.min), Limits::PLAIN.upper(within.max));
             empty |= within.is_empty();
         }
-        let load = |of: fn(&Eight) -> &[f32; 8]| [0, 1].map(|i: usize| f32x8::<S>::simd_from(simd, *of(&eights[i])));
-        let o = [load(|e| &e.origin[0]), load(|e| &e.origin[1]), load(|e| &e.origin[2])];
-        let d = [load(|e| &e.direction[0]), load(|e| &e.direction[1]), load(|e| &e.direction[2])];
-        let longest = [0, 1].map(|i| d[0][i].abs().max(d[1][i].abs()).max(d[2][i].abs()));
-        let (origins, directions, lengths) = (o.map(range), d.map(range), range(longest));
-        let [t_min, _] = range(load(|e| &e.t_min));
-        let [_, t_max] = range(load(|e| &e.t_max));
+        // No closures over vectors here and below: one that is not inlined makes calls of all that it does.
+        let [a, b] = &eights;
+        let o = [
+            pair(simd, &a.origin[0], &b.origin[0]),
+            pair(simd, &a.origin[1], &b.origin[1]),
+            pair(simd, &a.origin[2], &b.origin[2]),
+        ];
+        let d = [
+            pair(simd, &a.direction[0], &b.direction[0]),
+            pair(simd, &a.direction[1], &b.direction[1]),
+            pair(simd, &a.direction[2], &b.direction[2]),
+        ];
+        let longest =
+            [d[0][0].abs().max(d[1][0].abs()).max(d[2][0].abs()), d[0][1].abs().max(d[1][1].abs()).max(d[2][1].abs())];
+        let (origins, directions) = ([range(o[0]), range(o[1]), range(o[2])], [range(d[0]), range(d[1]), range(d[2])]);
+        let lengths = range(longest);
+        let [t_min, _] = range(pair(simd, &a.t_min, &b.t_min));
+        let [_, t_max] = range(pair(simd, &a.t_max, &b.t_max));
         // Sums of a NaN or an infinity with others are one, and fail the comparisons below.
-        let sums = [0, 1].map(|i| (o[0][i] + o[1][i] + o[2][i]) + (d[0][i] + d[1][i] + d[2][i]));
-        let sum = (sums[0] + sums[1]).reduce_sum();
+        let all = (o[0][0] + o[1][0] + o[2][0]) + (d[0][0] + d[1][0] + d[2][0]);
+        let sum = (all + (o[0][1] + o[1][1] + o[2][1]) + (d[0][1] + d[1][1] + d[2][1])).reduce_sum();
         let largest = |[low, high]: [f32; 2]| if -low > high { -low } else { high };
         let size = origins.iter().fold(0.0, |m: f32, &r| m.max(largest(r)));
         let plain = (size <= NEAR) & (lengths[0] >= LENGTHS[0]) & (lengths[1] <= LENGTHS[1]) & sum.is_finite() & !empty;
@@ -150,15 +166,19 @@ impl Bundle {
     /// The bounds in every lane.
     #[inline(always)]
     pub(crate) fn lanes<S: Simd>(&self, simd: S) -> Lanes<S> {
-        let spread = |v: &[f32; 3]| v.map(|x| f32x8::splat(simd, x));
         Lanes {
-            near_origin: spread(&self.near_origin),
-            far_origin: spread(&self.far_origin),
-            inverse: [spread(&self.inverse[0]), spread(&self.inverse[1])],
+            near_origin: spread(simd, self.near_origin),
+            far_origin: spread(simd, self.far_origin),
+            inverse: [spread(simd, self.inverse[0]), spread(simd, self.inverse[1])],
             t_min: f32x8::splat(simd, self.t_min),
             near: [self.away & 1, 2 + (self.away >> 1 & 1), 4 + (self.away >> 2 & 1)],
         }
     }
+}
+
+#[inline(always)]
+fn spread<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
+    [f32x8::splat(simd, x), f32x8::splat(simd, y), f32x8::splat(simd, z)]
 }
 
 /// [`Bundle`]'s bounds in every lane.

@@ -71,7 +71,7 @@ fn go_together(rays: &[Stretch; RAYS]) -> bool {
 
 /// A bundle in which more triangles than this are in question for some ray is too wide for its mesh: the rays are faster
 /// alone.
-const MOST_TRIANGLES: u32 = 40;
+const MOST_TRIANGLES: u32 = 80;
 
 /// What all rays of a bundle have in common.
 struct Common<S: Simd> {

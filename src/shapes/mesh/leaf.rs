@@ -199,8 +199,8 @@ impl Leaf {
     /// One triangle, in every lane.
     #[inline(always)]
     pub(super) fn triangle<S: Simd>(&self, simd: S, lane: usize, exact: bool) -> Triangles<S> {
-        let everywhere = |rows: &[[f32; 8]; 3]| [0, 1, 2].map(|i| splat(simd, rows[i][lane & 7]));
-        let (v0, v1, v2) = (everywhere(&self.v0), everywhere(&self.v1), everywhere(&self.v2));
+        let (v0, v1, v2) =
+            (everywhere(simd, &self.v0, lane), everywhere(simd, &self.v1, lane), everywhere(simd, &self.v2, lane));
         let (e1, e2) = if exact { (minus(v1, v0), minus(v2, v0)) } else { (v1, v2) };
         Triangles { v0, e1, e2, size: splat(simd, self.size[lane & 7]) }
     }
@@ -282,16 +282,20 @@ impl<S: Simd> Thick<S> {
         let steps = steps(bundle.size, PLAIN_ERROR);
         // Up by far more than the roundings of what is made of them.
         let up = 1.0 + 1e-5;
-        let turn = bundle.direction_spread.map(|x| x * up);
-        let moved = bundle.origin_spread.map(|x| x * up);
-        let most = |i: usize| bundle.direction[i].abs() + turn[i];
-        let shift = [[1, 2], [2, 0], [0, 1]].map(|[j, k]| (moved[j] * most(k) + moved[k] * most(j)) * up);
-        let everywhere = |v: [f32; 3]| v.map(|x| splat(simd, x));
+        let (mut turn, mut moved, mut most, mut shift) = ([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
+        for i in 0..3 {
+            (turn[i], moved[i]) = (bundle.direction_spread[i] * up, bundle.origin_spread[i] * up);
+            most[i] = bundle.direction[i].abs() + turn[i];
+        }
+        for i in 0..3 {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            shift[i] = (moved[j] * most[k] + moved[k] * most[j]) * up;
+        }
         Self {
-            origin: everywhere(bundle.origin),
-            direction: everywhere(bundle.direction),
-            turn: everywhere(turn),
-            shift: everywhere(shift),
+            origin: three(simd, bundle.origin),
+            direction: three(simd, bundle.direction),
+            turn: three(simd, turn),
+            shift: three(simd, shift),
             margins: Margins::new(steps, bundle.lengths[1]),
             reach: steps / bundle.lengths[0],
         }
@@ -309,11 +313,14 @@ impl<S: Simd> Thick<S> {
         let v = -dot(r, e1);
         let w = det - u - v;
         // How much of r, and with it of u, v, det and w, the rays differ by.
-        let (c, turn) = (c.map(f32x8::abs), &self.turn);
-        let r = [[1, 2], [2, 0], [0, 1]].map(|[j, k]| [c[j] * turn[k], c[k] * turn[j]]);
-        let r = [0, 1, 2].map(|i| r[i][0] + (r[i][1] + self.shift[i]));
-        let (of_u, of_v) = (dot(r, e2.map(f32x8::abs)), dot(r, e1.map(f32x8::abs)));
-        let of_w = dot(n.map(f32x8::abs), *turn) + (of_u + of_v);
+        let (c, turn, shift) = (absolute(c), self.turn, self.shift);
+        let r = [
+            c[1].mul_add(turn[2], c[2].mul_add(turn[1], shift[0])),
+            c[2].mul_add(turn[0], c[0].mul_add(turn[2], shift[1])),
+            c[0].mul_add(turn[1], c[1].mul_add(turn[0], shift[2])),
+        ];
+        let (of_u, of_v) = (dot(r, absolute(e2)), dot(r, absolute(e1)));
+        let of_w = dot(absolute(n), turn) + (of_u + of_v);
         let margin = self.margins.edges(simd, size);
         let up = splat(simd, 1.0 + 1e-5);
         let (of_u, of_v, of_w) = (of_u.mul_add(up, margin), of_v.mul_add(up, margin), of_w.mul_add(up, margin));
@@ -366,6 +373,22 @@ fn spread<S: Simd>(simd: S, v: &[f32; 4]) -> Vec8<S> {
 #[inline(always)]
 pub(super) fn load<S: Simd>(simd: S, rows: &[[f32; 8]; 3]) -> Vec8<S> {
     [rows[0].simd_into(simd), rows[1].simd_into(simd), rows[2].simd_into(simd)]
+}
+
+/// One lane of each row, in every lane.
+#[inline(always)]
+fn everywhere<S: Simd>(simd: S, rows: &[[f32; 8]; 3], lane: usize) -> Vec8<S> {
+    three(simd, [rows[0][lane & 7], rows[1][lane & 7], rows[2][lane & 7]])
+}
+
+#[inline(always)]
+fn three<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> Vec8<S> {
+    [splat(simd, x), splat(simd, y), splat(simd, z)]
+}
+
+#[inline(always)]
+fn absolute<S: Simd>(a: Vec8<S>) -> Vec8<S> {
+    [a[0].abs(), a[1].abs(), a[2].abs()]
 }
 
 #[inline(always)]
