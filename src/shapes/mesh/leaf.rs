@@ -287,9 +287,9 @@ impl<S: Simd> Thick<S> {
             (turn[i], moved[i]) = (bundle.direction_spread[i] * up, bundle.origin_spread[i] * up);
             most[i] = bundle.direction[i].abs() + turn[i];
         }
-        for i in 0..3 {
+        for (i, shift) in shift.iter_mut().enumerate() {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            shift[i] = (moved[j] * most[k] + moved[k] * most[j]) * up;
+            *shift = (moved[j] * most[k] + moved[k] * most[j]) * up;
         }
         Self {
             origin: three(simd, bundle.origin),
