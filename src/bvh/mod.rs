@@ -1,9 +1,10 @@
 //! A tree of boxes that knows no shapes: objects are numbers with a box each, leaves call closures.
 //!
 //! `build` makes a binary tree by the surface area heuristic (`split`), `reinsert` moves what lies badly, `collapse` packs
-//! the tree into nodes of eight f32 boxes, `traverse` walks it front to back with one ray. Boxes are rounded outward into the frame of `frame`, and the ray's
-//! constants in `slab` carry margins for every rounding between the f64 ray and the f32 boxes: no box that holds a
-//! point of the ray is skipped (docs/numerics.md §10).
+//! the tree into nodes of eight f32 boxes, `traverse` walks it front to back with one ray (`slab`) or with many that go
+//! the same way (`bundle`). Boxes are rounded outward into the frame of `frame`, and the ray's constants carry margins
+//! for every rounding between the f64 ray and the f32 boxes: no box that holds a point of the ray is skipped
+//! (docs/numerics.md §10).
 
 mod build;
 mod bundle;
