@@ -1,6 +1,7 @@
 //! The report is honest: deliberately broken kernels show up in its numbers, by as much as they are broken.
 #![allow(dead_code, unreachable_pub)]
 
+mod meshes;
 mod support;
 
 #[path = "../examples/speed_vs_error/kernels.rs"]
@@ -11,13 +12,16 @@ mod rows;
 mod table;
 #[path = "../examples/speed_vs_error/timing.rs"]
 mod timing;
+#[path = "../examples/speed_vs_error/watertight.rs"]
+mod watertight;
 
 use kernels::{Entry, Function, Origin};
 use rows::{Accuracy, Sheet};
 use support::cases::Kernel;
 use truehit::glam::{DVec2, DVec3};
-use truehit::kernel::{frustum, sphere};
+use truehit::kernel::{frustum, sphere, triangle};
 use truehit::{Hit, Interval, Ray};
+use watertight::Sieve;
 
 const CASES: usize = 400;
 
@@ -121,4 +125,43 @@ fn a_slow_kernel_and_its_slow_rays_show() {
     let share = sheet.cases.iter().filter(|c| c.ray.origin.x.to_bits().is_multiple_of(8)).count() as f64 / CASES as f64;
     let seen = slow.slower_than(20.0 * quick.typical());
     assert!((seen - share).abs() < 0.03, "{seen} of {share}");
+}
+
+#[test]
+fn leaks_double_hits_and_wrong_triangles_show() {
+    /// Blind to triangles' borders: a λ of an open triangle.
+    fn open(ray: &Ray, t: &[DVec3; 3], within: Interval) -> Option<Hit> {
+        triangle::intersect(ray, t, within).filter(|h| h.uv.x > 0.0 && h.uv.y > 0.0 && h.uv.x + h.uv.y < 1.0)
+    }
+    fn backwards(ray: &Ray, t: &[DVec3; 3], _: Interval) -> Option<Hit> {
+        triangle::intersect(ray, t, Interval::LINE)
+    }
+    let settings = watertight::settings(60);
+    let of = |function| Sieve::of("under test", true, &settings, |s| watertight::in_a_loop(s, function));
+    let rays = [240; 3];
+
+    let right = of(triangle::intersect);
+    assert!(right.is_tight() && right.rays == rays && right.checked > 150);
+    // Closed triangles share their borders, where some rays go exactly.
+    let doubles = right.doubles.unwrap();
+    assert!(doubles[0] > 10 && doubles[1] > 10 && doubles[2] == 0, "{doubles:?}");
+
+    let leaky = of(open);
+    assert!(!leaky.is_tight());
+    assert!(leaky.leaks[0] > 10 && leaky.leaks[1] > 10 && leaky.leaks[2] == 0, "{:?}", leaky.leaks);
+
+    let behind = of(backwards);
+    assert_eq!((behind.leaks, behind.others), ([0; 3], Some(behind.checked)));
+    assert_eq!(behind.doubles, Some(rays));
+}
+
+#[test]
+fn a_mesh_is_tight_and_crossed_once() {
+    let sieves = watertight::all(40);
+    assert_eq!(sieves.iter().filter(|s| s.shipped).count(), 6);
+    for s in sieves.iter().filter(|s| s.shipped) {
+        assert!(s.is_tight(), "{}: {:?} leaks, {:?}", s.name, s.leaks, s.others);
+    }
+    let crosses = sieves.iter().find(|s| s.name.contains("crosses")).unwrap();
+    assert_eq!(crosses.doubles, Some([0; 3]));
 }

@@ -7,6 +7,9 @@
 #[path = "../../tests/support/mod.rs"]
 mod support;
 
+#[path = "../../tests/meshes/mod.rs"]
+mod meshes;
+
 mod kernels;
 mod page;
 mod pictures;
@@ -17,6 +20,7 @@ mod svg;
 mod sweeps;
 mod table;
 mod timing;
+mod watertight;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use kernels::Origin;
@@ -66,7 +70,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let wanted = |kernel: Kernel| options.kernel.as_ref().is_none_or(|k| k == kernel.name());
     let families: Vec<_> = support::families::all().into_iter().filter(|f| wanted(f.kernel)).collect();
 
-    let bar = ProgressBar::new(families.len() as u64 + 8);
+    let bar = ProgressBar::new(families.len() as u64 + 9);
     bar.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} [{elapsed}]")?);
     let mut rows = Vec::new();
     for family in &families {
@@ -90,6 +94,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     bar.set_message("points, normals, spawned rays");
     let surfaces = surfaces::all(options.cases, &wanted);
+    bar.inc(1);
+
+    bar.set_message("closed meshes");
+    let sieves = if wanted(Kernel::Mesh) { watertight::all(options.cases) } else { Vec::new() };
     bar.inc(1);
 
     std::fs::create_dir_all(options.out.join("pictures"))?;
@@ -116,7 +124,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     bar.finish_and_clear();
 
-    let page = page::Page { rows: &rows, surfaces: &surfaces, cases: options.cases, full: options.full };
+    let page =
+        page::Page { rows: &rows, surfaces: &surfaces, sieves: &sieves, cases: options.cases, full: options.full };
     std::fs::write(options.out.join("speed-vs-error.md"), page.markdown())?;
     std::fs::write(options.out.join("speed-vs-error.csv"), page.csv())?;
     if options.kernel.is_none() {
@@ -132,6 +141,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     for row in broken {
         println!("  {} {} {}: {}", row.entry.kernel.name(), row.number, row.family, page::shortcoming(row));
+    }
+    for s in sieves.iter().filter(|s| s.shipped && !s.is_tight()) {
+        println!("  {} is not tight: {:?} leaks, {:?} on other triangles", s.name, s.leaks, s.others);
     }
     println!("written: {0}/speed-vs-error.md, {0}/speed-vs-error.csv, {0}/pictures/", options.out.display());
     Ok(())

@@ -6,8 +6,9 @@ use crate::support::cases::{Case, Kernel, Solid};
 use crate::support::measure;
 use crate::support::oracle::{self, WALL};
 use crate::support::rng::Rng;
+use crate::support::shapes::as_stored;
 use crate::table;
-use truehit::glam::DVec3;
+use truehit::glam::{DAffine3, DVec3};
 use truehit::{Hit, Interval, Ray, Shape, Surface};
 
 /// One way to answer, on all families of one shape.
@@ -25,15 +26,27 @@ pub struct SurfaceRow {
 }
 
 /// The shapes whose points and normals are looked at.
-const SHAPES: [Kernel; 5] = [Kernel::Plane, Kernel::Triangle, Kernel::Sphere, Kernel::Cylinder, Kernel::Cone];
+const SHAPES: [Kernel; 8] = [
+    Kernel::Plane,
+    Kernel::Triangle,
+    Kernel::Polygon,
+    Kernel::Sphere,
+    Kernel::Cylinder,
+    Kernel::Cone,
+    Kernel::Mesh,
+    Kernel::Affine,
+];
 
 pub fn all(cases: usize, wanted: &impl Fn(Kernel) -> bool) -> Vec<SurfaceRow> {
     let entries = table::all();
     let mut rows = Vec::new();
     for kernel in SHAPES.into_iter().filter(|k| wanted(*k)) {
         let families: Vec<_> = crate::support::families::all().into_iter().filter(|f| f.kernel == kernel).collect();
-        let cases: Vec<Case> = families.iter().flat_map(|f| (0..cases.div_ceil(4)).map(|i| f.case(i))).collect();
-        for name in ["Möller–Trumbore f64", "slide formula f64", "textbook f64", "truehit"] {
+        let cases: Vec<Case> =
+            families.iter().flat_map(|f| (0..cases.div_ceil(4)).map(|i| as_stored(f.case(i)))).collect();
+        let names =
+            ["Möller–Trumbore f64", "odd/even f64", "slide formula f64", "textbook f64", "mapped ray f64", "truehit"];
+        for name in names {
             let entry = entries.iter().find(|e| e.kernel == kernel && e.name == name);
             rows.extend(entry.map(|e| row(e, &cases)));
         }
@@ -85,7 +98,7 @@ fn row(entry: &Entry, cases: &[Case]) -> SurfaceRow {
         if !point.is_finite() || near_apex(&case.solid, &exact_point, hit.part) {
             continue;
         }
-        let off = distance(&case.solid, point, hit.part);
+        let off = distance(&case.solid, &point.into(), hit.part);
         // A point's own size: a hit near the origin from far away is judged by where it is.
         out.points.push(off / measure::ulp(point.abs().max_element().max(largest(&case.solid))));
         if let Some(v) = &mut out.violations {
@@ -98,15 +111,24 @@ fn row(entry: &Entry, cases: &[Case]) -> SurfaceRow {
         out.spawned += 1;
         out.rehits += usize::from(if shipped {
             let ray = Surface::new(shape.as_ref(), &case.ray, &hit).spawn(away);
-            shape.intersect(&ray, Interval::FORWARD).is_some()
+            shape.intersect(&ray, Interval::FORWARD).is_some_and(|again| is_rehit(&case.solid, &hit, &again))
         } else {
             let ray = Ray { origin: point, direction: away };
-            answer(entry.function, &ray, &case.solid).is_some()
+            answer(entry.function, &ray, &case.solid).is_some_and(|again| is_rehit(&case.solid, &hit, &again))
         });
     }
     out.points.sort_by(f64::total_cmp);
     out.normals.sort_by(f64::total_cmp);
     out
+}
+
+/// Other triangles of a mesh may well be met; no other shape of these by a ray that leaves it.
+fn is_rehit(solid: &Solid, hit: &Hit, again: &Hit) -> bool {
+    match solid {
+        Solid::Mesh { .. } => hit.part == again.part,
+        Solid::Affine { inner, .. } => is_rehit(inner, hit, again),
+        _ => true,
+    }
 }
 
 fn answer(function: Function, ray: &Ray, solid: &Solid) -> Answer {
@@ -122,7 +144,15 @@ fn largest(solid: &Solid) -> f64 {
         Solid::Triangle(v) => of(v),
         Solid::Sphere { center, radius } => of(&[*center]).max(*radius),
         Solid::Frustum { base, top, base_radius, top_radius } => of(&[*base, *top]).max(*base_radius).max(*top_radius),
-        _ => f64::NAN,
+        Solid::Polygon(contours) => contours.iter().map(|c| of(c)).fold(0.0, f64::max),
+        Solid::Mesh { positions, .. } => of(positions),
+        // Where the object's points come to lie in the world.
+        Solid::Affine { world_from_object, inner, .. } => {
+            let m = world_from_object.matrix3;
+            let grown = [m.x_axis, m.y_axis, m.z_axis].map(|c| of(&[c])).iter().sum::<f64>();
+            of(&[world_from_object.translation]) + largest(inner) * grown
+        }
+        Solid::Slab { .. } => f64::NAN,
     }
 }
 
@@ -132,6 +162,9 @@ fn smallest(solid: &Solid) -> f64 {
         Solid::Sphere { radius, .. } => *radius,
         Solid::Frustum { base, top, base_radius, top_radius } => {
             base_radius.max(*top_radius).min((*top - *base).abs().max_element())
+        }
+        Solid::Affine { object_from_world, inner, .. } => {
+            smallest(inner).min(object_from_world.matrix3.x_axis.length())
         }
         _ => 1.0,
     }
@@ -149,16 +182,69 @@ fn along(base: DVec3, top: DVec3, p: &Big3) -> (Big3, Big3, Big, Big) {
     (w, a, wa, aa)
 }
 
+/// The image of a point, exactly.
+fn image(map: &DAffine3, p: &Big3) -> Big3 {
+    let m = map.matrix3;
+    let rows = [m.row(0), m.row(1), m.row(2)].map(Big3::from);
+    Big3(std::array::from_fn(|i| rows[i].dot(p))).plus(&map.translation.into())
+}
+
+/// The way a normal lies in the world: the linear part's transpose of it, exactly.
+fn transposed(map: &DAffine3, n: &Big3) -> Big3 {
+    let m = map.matrix3;
+    let columns = [m.x_axis, m.y_axis, m.z_axis].map(Big3::from);
+    Big3(std::array::from_fn(|i| columns[i].dot(n)))
+}
+
+/// The triangle that a mesh's part is.
+fn facet(positions: &[DVec3], triangles: &[[u32; 3]], part: u32) -> Solid {
+    Solid::Triangle(triangles[part as usize].map(|i| positions[i as usize]))
+}
+
+/// Newell's normal of the outer contour, exactly.
+fn newell(contours: &[Vec<DVec3>]) -> Big3 {
+    let outer: Vec<Big3> = contours[0].iter().map(|&v| v.into()).collect();
+    let edges = (1..outer.len() - 1).map(|i| outer[i].minus(&outer[0]).cross(&outer[i + 1].minus(&outer[0])));
+    edges.reduce(|sum, n| sum.plus(&n)).expect("three vertices")
+}
+
+/// Along the outward normal at a point of the surface, all of it exact.
+fn direction_at(solid: &Solid, p: &Big3, part: u32) -> Option<Big3> {
+    Some(match solid {
+        Solid::Plane { normal, .. } => (*normal).into(),
+        Solid::Triangle([a, b, c]) => {
+            let a = Big3::from(*a);
+            Big3::from(*b).minus(&a).cross(&Big3::from(*c).minus(&a))
+        }
+        Solid::Polygon(contours) => newell(contours),
+        Solid::Sphere { center, .. } => p.minus(&(*center).into()),
+        Solid::Frustum { base, top, base_radius, top_radius } => {
+            let (w, a, wa, aa) = along(*base, *top, p);
+            let scaled = |v: &Big3, s: &Big| Big3(std::array::from_fn(|i| &v.0[i] * s));
+            match part {
+                WALL => {
+                    // On the wall w·a² − a·(w·a) is as long as a²·r, r = r₀ + (r₁ − r₀)·w·a/a².
+                    let growth = &Big::from(*top_radius) - &Big::from(*base_radius);
+                    let radius = &(&Big::from(*base_radius) * &aa) + &(&growth * &wa);
+                    let radial = scaled(&w, &aa).minus(&scaled(&a, &wa));
+                    scaled(&radial, &aa).minus(&scaled(&a, &(&growth * &radius)))
+                }
+                oracle::BASE => Big3::from(DVec3::ZERO).minus(&a),
+                _ => a,
+            }
+        }
+        Solid::Mesh { positions, triangles } => direction_at(&facet(positions, triangles, part), p, part)?,
+        Solid::Affine { object_from_world: map, inner, .. } => {
+            transposed(map, &direction_at(inner, &image(map, p), part)?)
+        }
+        Solid::Slab { .. } => return None,
+    })
+}
+
 /// The outward unit normal at a point, from differences and products that are exact; `None` at an apex.
 pub fn normal_at(solid: &Solid, p: &Big3, part: u32) -> Option<DVec3> {
     let unit = |v: &Big3| to_f64(v).try_normalize();
     match solid {
-        Solid::Plane { normal, .. } => normal.try_normalize(),
-        Solid::Triangle([a, b, c]) => {
-            let a = Big3::from(*a);
-            unit(&Big3::from(*b).minus(&a).cross(&Big3::from(*c).minus(&a)))
-        }
-        Solid::Sphere { center, .. } => unit(&p.minus(&(*center).into())),
         Solid::Frustum { base, top, base_radius, top_radius } => {
             let (w, a, wa, aa) = along(*base, *top, p);
             let axis = to_f64(&a);
@@ -173,21 +259,23 @@ pub fn normal_at(solid: &Solid, p: &Big3, part: u32) -> Option<DVec3> {
                 _ => axis.try_normalize(),
             }
         }
-        _ => None,
+        _ => direction_at(solid, p, part)?.direction(),
     }
 }
 
 /// Where a wall's radius is next to nothing, and with it the direction its normal has.
 fn near_apex(solid: &Solid, p: &Big3, part: u32) -> bool {
+    if let Solid::Affine { object_from_world, inner, .. } = solid {
+        return near_apex(inner, &image(object_from_world, p), part);
+    }
     let Solid::Frustum { base, top, base_radius, top_radius } = solid else { return false };
     let (_, _, wa, aa) = along(*base, *top, p);
     let radius = base_radius + (top_radius - base_radius) * (wa.to_f64() / aa.to_f64());
     part == WALL && radius.abs() < 1e-9 * base_radius.max(*top_radius)
 }
 
-/// How far `q` is off the surface of its part, from numerators that are exact.
-fn distance(solid: &Solid, q: DVec3, part: u32) -> f64 {
-    let p = Big3::from(q);
+/// How far `p` is off the surface of its part, from numerators that are exact; under a map to first order.
+fn distance(solid: &Solid, p: &Big3, part: u32) -> f64 {
     match solid {
         Solid::Plane { point, normal } => {
             let n = Big3::from(*normal);
@@ -204,7 +292,7 @@ fn distance(solid: &Solid, q: DVec3, part: u32) -> f64 {
             (off.to_f64() / (to_f64(&f).length() + radius)).abs()
         }
         Solid::Frustum { base, top, base_radius, top_radius } => {
-            let (w, a, wa, aa) = along(*base, *top, &p);
+            let (w, a, wa, aa) = along(*base, *top, p);
             let height = to_f64(&a).length();
             if part == oracle::BASE {
                 return (wa.to_f64() / height).abs();
@@ -222,7 +310,19 @@ fn distance(solid: &Solid, q: DVec3, part: u32) -> f64 {
             let cosine = height / height.hypot(growth.to_f64());
             if sum == 0.0 { 0.0 } else { (off.to_f64() / (a2 * a2) / sum * cosine).abs() }
         }
-        _ => f64::NAN,
+        Solid::Polygon(contours) => {
+            let n = newell(contours);
+            (n.dot(&p.minus(&contours[0][0].into())).to_f64() / to_f64(&n).length()).abs()
+        }
+        Solid::Mesh { positions, triangles } => distance(&facet(positions, triangles, part), p, part),
+        Solid::Affine { object_from_world: map, inner, .. } => {
+            let q = image(map, p);
+            let Some(n) = direction_at(inner, &q, part) else { return f64::NAN };
+            // A unit along the world's normal is so many along the object's.
+            let stretch = to_f64(&transposed(map, &n)).length() / to_f64(&n).length();
+            distance(inner, &q, part) / stretch
+        }
+        Solid::Slab { .. } => f64::NAN,
     }
 }
 

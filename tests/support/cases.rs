@@ -88,7 +88,16 @@ impl Solid {
             Self::Affine { world_from_object: DAffine3 { matrix3: m, translation }, inner, .. } => {
                 format!("affine {} {} {} {} {}", v(m.x_axis), v(m.y_axis), v(m.z_axis), v(*translation), inner.hex())
             }
-            other => format!("{other:?}"),
+            Self::Polygon(contours) => {
+                let contour = |c: &Vec<DVec3>| format!(" {} {}", c.len(), c.iter().map(|&p| v(p)).collect::<String>());
+                format!("polygon {}{}", contours.len(), contours.iter().map(contour).collect::<String>())
+            }
+            Self::Mesh { positions, triangles } => format!(
+                "mesh {} {} {} {triangles:?}",
+                positions.len(),
+                triangles.len(),
+                positions.iter().map(|&p| v(p)).collect::<String>()
+            ),
         }
     }
 
@@ -111,6 +120,18 @@ impl Solid {
                 let object_from_world = DAffine3::IDENTITY;
                 Self::Affine { world_from_object, object_from_world, inner: Box::new(Self::from_hex(words)) }
             }
+            "polygon" => {
+                let contours = count(words);
+                let contour = |words: &mut _| (0..count(words)).map(|_| vector(words)).collect();
+                Self::Polygon((0..contours).map(|_| contour(words)).collect())
+            }
+            "mesh" => {
+                let (positions, triangles) = (count(words), count(words));
+                Self::Mesh {
+                    positions: (0..positions).map(|_| vector(words)).collect(),
+                    triangles: (0..triangles).map(|_| std::array::from_fn(|_| count(words) as u32)).collect(),
+                }
+            }
             other => panic!("no shape: {other}"),
         }
     }
@@ -118,6 +139,10 @@ impl Solid {
 
 fn vector<'a>(words: &mut impl Iterator<Item = &'a str>) -> DVec3 {
     DVec3::new(number(words), number(words), number(words))
+}
+
+fn count<'a>(words: &mut impl Iterator<Item = &'a str>) -> usize {
+    words.next().and_then(|w| w.parse().ok()).expect("a count")
 }
 
 fn number<'a>(words: &mut impl Iterator<Item = &'a str>) -> f64 {
