@@ -8,6 +8,7 @@ use super::dyadic::Dyadic;
 use super::eft::{Fused, Product, Split, two_sum};
 use super::number::{Number, Vector, cross, dot, vector};
 use super::ratio::Ratio;
+use super::tally;
 use crate::ray::Ray;
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -165,6 +166,7 @@ impl Map {
     #[cold]
     #[inline(never)]
     fn exact_image(&self, ray: &Ray) -> Option<Image> {
+        tally::exact();
         let (rows, translation) = self.exact();
         let (o, d) = (vector::<Dyadic>(ray.origin), vector::<Dyadic>(ray.direction));
         let rounded = |x: Dyadic| {

@@ -21,5 +21,6 @@ mod search;
 mod section;
 pub mod slab;
 pub mod sphere;
+pub mod tally;
 pub mod textbook;
 pub mod triangle;

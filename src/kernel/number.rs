@@ -7,6 +7,7 @@
 use super::bounded::Bounded;
 use super::dyadic::Dyadic;
 use super::scaled::Scaled;
+use super::tally;
 use glam::DVec3;
 use std::cmp::Ordering;
 
@@ -96,5 +97,8 @@ pub fn unit<N: Number>(v: &Vector<N>) -> Option<DVec3> {
 
 /// The exact sign of a polynomial: by double-doubles where they can tell, exactly otherwise.
 pub fn sign_of(bounded: impl FnOnce() -> Bounded, exact: impl FnOnce() -> Dyadic) -> Ordering {
-    bounded().sign().or_else(|| exact().sign()).unwrap_or(Ordering::Equal)
+    bounded().sign().unwrap_or_else(|| {
+        tally::exact();
+        exact().sign().unwrap_or(Ordering::Equal)
+    })
 }

@@ -10,6 +10,7 @@ use super::float::{exponent_of, ldexp, power};
 use super::lanes::{Double, Lanes};
 use super::number::{self, Number, difference, dot, vector};
 use super::ratio::{self, Ratio};
+use super::tally;
 use crate::{Hit, Interval, Ray};
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
@@ -188,8 +189,7 @@ fn ratio<N: Number>(ray: &Ray, point: DVec3, normal: DVec3) -> Ratio<N> {
 #[cold]
 #[inline(never)]
 fn refine(ray: &Ray, point: &DVec3, normal: &DVec3, min: f64, max: f64) -> Option<Hit> {
-    #[cfg(test)]
-    tests::COLD.with(|n| n.set(n.get() + 1));
+    tally::refined();
     let within = Interval { min, max };
     if !ray.is_valid() || within.is_empty() || !point.is_finite() || !normal.is_finite() {
         return None;
@@ -250,13 +250,8 @@ pub fn project(point: DVec3, [n, n_lo]: [DVec3; 2], x: DVec3) -> (DVec3, f64) {
 #[cfg(test)]
 mod tests {
     use super::super::search::{Rational, climb, dot3, each, exact, minus};
+    use super::super::tally::Tally;
     use super::*;
-    use std::cell::Cell;
-
-    thread_local! {
-        /// How often the fast path was left.
-        pub(super) static COLD: Cell<usize> = const { Cell::new(0) };
-    }
 
     /// Origin, direction, point, normal: from steep to grazing by x₁₂, from far to next to the plane by x₁₃.
     fn setting(x: &[f64]) -> (Ray, DVec3, DVec3) {
@@ -289,14 +284,14 @@ mod tests {
 
     #[test]
     fn ordinary_rays_hardly_ever_need_the_cold_path() {
-        let (mut cases, mut hits) = (0, 0);
+        let (mut cases, mut hits, before) = (0, 0, Tally::now());
         each(400_000, 12, |x| {
             let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
             let ray = Ray { origin: 5.0 * v(0), direction: v(3) };
             cases += 1;
             hits += usize::from(intersect(&ray, v(6), v(9), Interval::FORWARD).is_some());
         });
-        let cold = COLD.get();
+        let cold = Tally::now().since(before).refined;
         println!("plane: {cold} of {cases} ordinary rays, {hits} hits");
         assert!(cold * 10_000 < cases && hits * 3 > cases);
     }

@@ -12,6 +12,7 @@ use super::eft::{Fused, Product, Split};
 use super::number::{Number, Vector, cross, difference, dot, sign_of, vector};
 use super::plane::{Quotient, quotient, quotient_closely};
 use super::ratio::{self, Ratio};
+use super::tally;
 use super::triangle::edge_sign;
 use crate::{Aabb, Hit, Interval, Ray};
 use glam::{DVec2, DVec3};
@@ -229,6 +230,7 @@ fn surrounds_exactly(ray: &Ray, polygon: &Contours) -> bool {
         let along = N::difference(v[i], o[i]).times(&N::exactly(d[z]));
         along.minus(&N::difference(v[z], o[z]).times(&N::exactly(d[i])))
     }
+    tally::refined();
     let [x, y, z] = axes(ray.direction);
     let forwards = ray.direction[z] > 0.0;
     let seen = |v: DVec3| {

@@ -7,6 +7,7 @@ use super::bounded::Bounded;
 use super::dyadic::Dyadic;
 use super::number::Number;
 use super::scaled::{SCALED_ERROR, Scaled};
+use super::tally;
 use crate::{Interval, Ray};
 use glam::DVec3;
 use std::cmp::Ordering;
@@ -105,6 +106,7 @@ pub fn refine(
         }
         None => {}
     }
+    tally::exact();
     let ratio = exact();
     if ratio.denominator.is_zero() || !ratio.is_inside(within)? {
         return None;

@@ -247,7 +247,10 @@ macro_rules! refined {
             #[inline(always)]
             || $decide::<$crate::kernel::bounded::Bounded<$crate::kernel::eft::Split>>($($argument),*),
         )
-        .or_else(|_| $decide::<$crate::kernel::dyadic::Dyadic>($($argument),*))
+        .or_else(|_| {
+            $crate::kernel::tally::exact();
+            $decide::<$crate::kernel::dyadic::Dyadic>($($argument),*)
+        })
     };
 }
 pub(super) use refined;

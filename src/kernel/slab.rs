@@ -5,6 +5,7 @@
 use super::bound::{LARGE, U, UNDERFLOW};
 use super::number::{Number, sign_of};
 use super::ratio::Ratio;
+use super::tally;
 use crate::{Interval, Ray};
 use glam::DVec3;
 use std::cmp::Ordering;
@@ -85,19 +86,27 @@ impl Crossing {
             None => self
                 .ratio::<super::bounded::Bounded>()
                 .compare(limit)
-                .or_else(|| self.ratio::<super::dyadic::Dyadic>().compare(limit))
+                .or_else(|| {
+                    tally::exact();
+                    self.ratio::<super::dyadic::Dyadic>().compare(limit)
+                })
                 .unwrap_or(Ordering::Equal),
         }
     }
 
     fn lambda(self) -> f64 {
-        self.infinity().or_else(|| Some(self.ratio::<super::dyadic::Dyadic>().lambda(0.0)?.0)).unwrap_or(f64::NAN)
+        let exactly = || {
+            tally::exact();
+            Some(self.ratio::<super::dyadic::Dyadic>().lambda(0.0)?.0)
+        };
+        self.infinity().or_else(exactly).unwrap_or(f64::NAN)
     }
 }
 
 #[cold]
 #[inline(never)]
 fn decide(ray: &Ray, min: DVec3, max: DVec3, within: Interval) -> Option<(f64, f64)> {
+    tally::refined();
     if !ray.is_valid() || within.is_empty() || !min.cmple(max).all() {
         return None;
     }

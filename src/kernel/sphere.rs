@@ -13,6 +13,7 @@ use super::eft::{Fused, Product, Split, two_sum};
 use super::number::{Number, cross, difference, dot, vector};
 use super::pair::{Pair, in_range, plain_cross, plain_dot, taxicab};
 use super::section::{End, Quadratic, Undecided, fine, nearest, precise, refined, sign};
+use super::tally;
 use crate::hit::Hit;
 use crate::interval::Interval;
 use crate::ray::Ray;
@@ -171,8 +172,7 @@ fn small_root<P: Product>(ray: &Ray, center: DVec3, r: f64, root: f64, error: f6
 #[cold]
 #[inline(never)]
 fn refine(ray: &Ray, x: f64, y: f64, z: f64, radius: f64, min: f64, max: f64) -> Option<Hit> {
-    #[cfg(test)]
-    tests::COLD.with(|n| n.set(n.get() + 1));
+    tally::refined();
     let (center, within) = (DVec3::new(x, y, z), Interval { min, max });
     if !accepts(ray, center, radius) || within.is_empty() {
         return None;
@@ -239,13 +239,8 @@ fn locate<N: Number>(point: DVec3, center: DVec3, radius: f64) -> Result<Orderin
 #[cfg(test)]
 mod tests {
     use super::super::search::{Rational, climb, cross3, dot3, each, exact, minus};
+    use super::super::tally::Tally;
     use super::*;
-    use std::cell::Cell;
-
-    thread_local! {
-        /// How often the cold path was taken.
-        pub(super) static COLD: Cell<usize> = const { Cell::new(0) };
-    }
 
     /// f = x₀..₂ over 2^(10·x₇), d = x₃..₅, r from |f × d|/|d| and x₆: from clear hits to grazing ones.
     fn setting(x: &[f64]) -> Option<(DVec3, DVec3, DVec3, f64)> {
@@ -300,7 +295,7 @@ mod tests {
 
     #[test]
     fn ordinary_rays_hardly_ever_need_the_cold_path() {
-        let (mut cases, mut hits) = (0, 0);
+        let (mut cases, mut hits, before) = (0, 0, Tally::now());
         each(400_000, 9, |x| {
             let (f, u, across) = (DVec3::new(x[0], x[1], x[2]), DVec3::new(x[3], x[4], x[5]), x[6]);
             let (Some(u), Some(side)) = (u.try_normalize(), u.cross(f).try_normalize()) else { return };
@@ -309,7 +304,7 @@ mod tests {
             cases += 1;
             hits += usize::from(intersect(&Ray { origin, direction: u }, center, radius, Interval::FORWARD).is_some());
         });
-        let cold = COLD.get();
+        let cold = Tally::now().since(before).refined;
         println!("sphere: {cold} of {cases} ordinary rays, {hits} hits");
         assert!(cold * 10_000 < cases && hits * 3 > cases);
     }

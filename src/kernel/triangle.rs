@@ -14,6 +14,7 @@ use super::float::power;
 use super::lanes::{Double, Lanes};
 use super::number::{self, Number, cross, difference, dot, vector};
 use super::ratio::{self, Ratio};
+use super::tally;
 use crate::{Hit, Interval, Ray};
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
@@ -142,8 +143,7 @@ fn extremes(u: f64, v: f64, w: f64) -> (f64, f64) {
 #[cold]
 #[inline(never)]
 fn closely(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
-    #[cfg(test)]
-    tests::COLD.with(|n| n.set(n.get() + 1));
+    tally::refined();
     let forms = Forms::of(ray, vertices);
     if !forms.is_hit().unwrap_or_else(|| is_hit(ray, vertices)) {
         return None;
@@ -289,6 +289,7 @@ fn is_hit(ray: &Ray, vertices: &[DVec3; 3]) -> bool {
     if signs.contains(&Some(Ordering::Less)) && signs.contains(&Some(Ordering::Greater)) {
         return false;
     }
+    tally::exact();
     agree(sides::<Dyadic>(ray, vertices).map(|s| s.sign().unwrap_or(Ordering::Equal)))
 }
 
@@ -343,11 +344,13 @@ pub fn compare(ray: &Ray, first: &[DVec3; 3], second: &[DVec3; 3]) -> Ordering {
     if first == second {
         return Ordering::Equal;
     }
+    tally::refined();
     let (x, y): (Ratio<Bounded>, _) = (plane(ray, first), plane::<Bounded>(ray, second));
     let difference = x.numerator.times(&y.denominator).minus(&y.numerator.times(&x.denominator));
     if let (Some(sign), Some(x), Some(y)) = (difference.sign(), x.denominator.sign(), y.denominator.sign()) {
         return if x == y { sign } else { sign.reverse() };
     }
+    tally::exact();
     plane::<Dyadic>(ray, first).compare_exactly(&plane(ray, second))
 }
 
@@ -437,13 +440,8 @@ pub fn side(vertices: &[DVec3; 3], point: DVec3) -> Ordering {
 mod tests {
     use super::super::lanes::Plain;
     use super::super::search::{Rational, climb, cross3, dot3, each, exact, minus};
+    use super::super::tally::Tally;
     use super::*;
-    use std::cell::Cell;
-
-    thread_local! {
-        /// How often the fast path was left.
-        pub(super) static COLD: Cell<usize> = const { Cell::new(0) };
-    }
 
     /// From near and far, thin and plump, steep and grazing: vertices, and a ray at a point of their plane.
     fn setting(x: &[f64]) -> (Ray, [DVec3; 3]) {
@@ -523,7 +521,7 @@ mod tests {
 
     #[test]
     fn ordinary_rays_hardly_ever_need_the_cold_path() {
-        let (mut cases, mut hits) = (0, 0);
+        let (mut cases, mut hits, before) = (0, 0, Tally::now());
         each(400_000, 14, |x| {
             let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
             let (origin, t) = (5.0 * v(0), [v(3), v(6), v(9)]);
@@ -532,7 +530,7 @@ mod tests {
             cases += 1;
             hits += usize::from(intersect(&ray, &t, Interval::FORWARD).is_some());
         });
-        let cold = COLD.get();
+        let cold = Tally::now().since(before).refined;
         println!("triangle: {cold} of {cases} ordinary rays, {hits} hits");
         assert!(cold * 10_000 < cases && hits * 3 > cases);
     }

@@ -266,17 +266,12 @@ fn wall_step<P: Product>(
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::super::super::search::{Rational, climb, cross3, dot3, each, exact, minus};
     use super::super::{Solid, intersect as answer};
     use super::*;
     use crate::kernel::eft::{Fused, Split};
-    use std::cell::Cell;
-
-    thread_local! {
-        /// How often the cold path was taken.
-        pub(in super::super) static COLD: Cell<usize> = const { Cell::new(0) };
-    }
+    use crate::kernel::tally::Tally;
 
     /// Base, top, radii and a ray from near or far, with few relations or near-ties between them.
     fn setting(x: &[f64]) -> (Ray, Solid) {
@@ -435,7 +430,7 @@ pub(super) mod tests {
 
     #[test]
     fn ordinary_rays_hardly_ever_need_the_cold_path() {
-        let (mut cases, mut hits) = (0, 0);
+        let (mut cases, mut hits, before) = (0, 0, Tally::now());
         each(400_000, DIMENSION, |x| {
             let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
             let Some(u) = v(9).try_normalize() else { return };
@@ -448,7 +443,7 @@ pub(super) mod tests {
             cases += 1;
             hits += usize::from(answer(&ray, base, base + axis, base_radius, top_radius, Interval::FORWARD).is_some());
         });
-        let cold = COLD.get();
+        let cold = Tally::now().since(before).refined;
         println!("frustum: {cold} of {cases} ordinary rays, {hits} hits");
         assert!(cold * 10_000 < cases && hits * 3 > cases);
     }

@@ -10,6 +10,7 @@ use super::cpu;
 use super::eft::{Fused, Split};
 use super::number::{Number, Vector, cross, difference, dot, vector};
 use super::section::{End, Quadratic, Undecided, fine, nearest, precise, refined, sign};
+use super::tally;
 use crate::hit::Hit;
 use crate::interval::Interval;
 use crate::ray::Ray;
@@ -57,8 +58,7 @@ pub fn intersect(
 #[cold]
 #[inline(never)]
 fn refine(ray: &Ray, base: &DVec3, top: &DVec3, r0: f64, r1: f64, min: f64, max: f64) -> Option<Hit> {
-    #[cfg(test)]
-    fast::tests::COLD.with(|n| n.set(n.get() + 1));
+    tally::refined();
     let within = Interval { min, max };
     let solid = Solid { base: *base, top: *top, base_radius: r0, top_radius: r1 };
     if !ray.is_valid() || !solid.is_valid() || within.is_empty() {

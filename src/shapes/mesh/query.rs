@@ -4,7 +4,7 @@ use super::Mesh;
 use super::leaf::{Leaf, Outcome, Probe};
 use crate::bvh::{self, Lanes, Limits, LocalRay};
 use crate::kernel::eft::{Fused, Split};
-use crate::kernel::triangle;
+use crate::kernel::{tally, triangle};
 use crate::{Hit, Interval, Ray};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::DVec3;
@@ -44,6 +44,7 @@ fn any_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> bool 
 #[cold]
 #[inline(never)]
 fn closest_of_all(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
+    tally::refined();
     if within.is_empty() || !ray.is_valid() {
         return None;
     }
