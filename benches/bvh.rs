@@ -3,10 +3,13 @@
 
 #[path = "../tests/meshes/mod.rs"]
 mod meshes;
+#[path = "../tests/support/rng.rs"]
+mod rng;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
-use meshes::{Random, icosphere, moved, torus};
+use meshes::{icosphere, moved, torus};
+use rng::Rng;
 use std::hint::black_box;
 use std::ops::ControlFlow;
 use truehit::bvh::Level;
@@ -24,7 +27,7 @@ struct RaySet {
 
 /// Camera rays at a torus in rows, rays that leave its surface, rays anywhere, and shadow rays to a light.
 fn rays(mesh: &Mesh) -> Vec<RaySet> {
-    let mut random = Random(1);
+    let mut random = Rng::new(1);
     let eye = DVec3::new(0.5, -2.6, 1.7);
     let forward = (-eye).normalize();
     let right = forward.cross(DVec3::Z).normalize();
@@ -44,10 +47,9 @@ fn rays(mesh: &Mesh) -> Vec<RaySet> {
         })
         .collect();
     let at = |i: usize| points[i % points.len()];
-    let bounce: Vec<_> =
-        (0..RAYS).map(|i| (Ray::new(at(i).0, at(i).1 + random.direction()), Interval::FORWARD)).collect();
+    let bounce: Vec<_> = (0..RAYS).map(|i| (Ray::new(at(i).0, at(i).1 + random.unit()), Interval::FORWARD)).collect();
     let anywhere: Vec<_> =
-        (0..RAYS).map(|_| (Ray::new(1.2 * random.in_cube(), random.direction()), Interval::FORWARD)).collect();
+        (0..RAYS).map(|_| (Ray::new(1.2 * random.in_cube(1.0), random.unit()), Interval::FORWARD)).collect();
     let light = DVec3::new(3.0, 1.0, 2.0);
     let shadow = (0..RAYS).map(|i| (Ray::new(at(i).0, light - at(i).0), Interval::new(0.0, 1.0))).collect();
     let set = |name, any, rays, least| RaySet { name, any, rays, least };
@@ -110,8 +112,8 @@ fn traversal(c: &mut Criterion) {
 fn leaf(c: &mut Criterion) {
     let (positions, triangles) = icosphere(0);
     let mesh = Mesh::new(positions, triangles[..8].to_vec()).expect("eight triangles");
-    let mut random = Random(2);
-    let rays: Vec<_> = std::iter::repeat_with(|| Ray::new(0.05 * random.in_cube(), random.direction()))
+    let mut random = Rng::new(2);
+    let rays: Vec<_> = std::iter::repeat_with(|| Ray::new(0.05 * random.in_cube(1.0), random.unit()))
         .filter(|ray| mesh.occludes(ray, Interval::FORWARD))
         .take(RAYS)
         .collect();

@@ -1,8 +1,12 @@
 //! Kernels beside the textbook's: shipped (exact decision, λ to the last bit or nearly, proved bound) and textbook f64, on
 //! the same rays, half of which hit. `cargo bench --bench kernels`
 
+#[path = "../tests/support/rng.rs"]
+mod rng;
+
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
+use rng::Rng;
 use std::hint::black_box;
 use truehit::glam::{DAffine3, DVec3};
 use truehit::kernel::{plane, polygon, slab, textbook, triangle};
@@ -11,30 +15,15 @@ use truehit::{Affine, Hit, Interval, Ray, Shape, Triangle};
 const RAYS: usize = 4096;
 const FORWARD: Interval = Interval::FORWARD;
 
-/// splitmix64
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / 2f64.powi(53)
-    }
-    fn vector(&mut self) -> DVec3 {
-        2.0 * DVec3::new(self.unit(), self.unit(), self.unit()) - DVec3::ONE
-    }
-}
-
 type Case = (Ray, [DVec3; 3]);
 
 /// Rays from `distance` at points a + u·e₁ + v·e₂, u and v below `spread`: all hit for 0.5, half of them for 1.
 fn triangles(distance: f64, spread: f64) -> Vec<Case> {
-    let mut r = Random(1);
+    let mut r = Rng::new(1);
     let case = |_| {
-        let [a, b, c] = [r.vector(), r.vector(), r.vector()];
-        let origin = distance * r.vector();
-        let target = a + spread * r.unit() * (b - a) + spread * r.unit() * (c - a);
+        let [a, b, c] = [r.in_cube(1.0), r.in_cube(1.0), r.in_cube(1.0)];
+        let origin = distance * r.in_cube(1.0);
+        let target = a + spread * r.fraction() * (b - a) + spread * r.fraction() * (c - a);
         (Ray::new(origin, target - origin), [a, b, c])
     };
     (0..RAYS).map(case).collect()
@@ -56,11 +45,11 @@ fn flat_kernels(criterion: &mut Criterion) {
         each(&mut group, "Möller–Trumbore", &cases, |(ray, t)| textbook::moller_trumbore::<f64>(ray, t, FORWARD));
         each(&mut group, "shipped", &cases, |(ray, t)| triangle::intersect(ray, t, FORWARD));
     }
-    let mut r = Random(2);
+    let mut r = Rng::new(2);
     let grid = |v: DVec3| (64.0 * v).round() / 8.0;
     let on_edge = |_| {
-        let [a, b, c] = [grid(r.vector()), grid(r.vector()), grid(r.vector())];
-        let origin = grid(5.0 * r.vector());
+        let [a, b, c] = [grid(r.in_cube(1.0)), grid(r.in_cube(1.0)), grid(r.in_cube(1.0))];
+        let origin = grid(5.0 * r.in_cube(1.0));
         (Ray::new(origin, a + 0.25 * (b - a) - origin), [a, b, c])
     };
     let on_edges: Vec<Case> = (0..RAYS).map(on_edge).collect();
@@ -86,9 +75,9 @@ fn flat_kernels(criterion: &mut Criterion) {
         [[-5.0, -4.0], [5.0, -4.0], [5.0, 4.0], [3.0, -2.0], [1.0, 4.0], [-1.0, -2.0], [-3.0, 4.0], [-5.0, -2.0]];
     let comb = comb.map(|[x, y]| DVec3::new(x, y, 1.0));
     let contours = polygon::Contours::new(&[&comb]).expect("a polygon");
-    let mut r = Random(3);
+    let mut r = Rng::new(3);
     let ray = |_| {
-        let (origin, target) = (50.0 * r.vector(), DVec3::new(6.0, 5.0, 0.0) * r.vector() + DVec3::Z);
+        let (origin, target) = (50.0 * r.in_cube(1.0), DVec3::new(6.0, 5.0, 0.0) * r.in_cube(1.0) + DVec3::Z);
         Ray::new(origin, target - origin)
     };
     let rays: Vec<Ray> = (0..RAYS).map(ray).collect();

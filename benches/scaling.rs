@@ -3,8 +3,11 @@
 
 #[path = "../tests/meshes/mod.rs"]
 mod meshes;
+#[path = "../tests/support/rng.rs"]
+mod rng;
 
-use meshes::{Parts, Random, icosphere};
+use meshes::{Parts, icosphere};
+use rng::Rng;
 use std::sync::Arc;
 use std::time::Instant;
 use truehit::glam::{DAffine3, DQuat, DVec3};
@@ -67,11 +70,11 @@ fn mesh(parts: Parts) {
     let copy = parts.clone();
     let (serial, _) = timed(|| on_one_thread(|| Mesh::new(copy.0, copy.1)));
     let (seconds, mesh) = timed(|| Mesh::new(parts.0, parts.1).expect("a terrain"));
-    let mut random = Random(1);
+    let mut random = Rng::new(1);
     let down: Vec<Ray> = (0..RAYS)
         .map(|_| {
-            let from = DVec3::new(random.unit(), random.unit(), 0.3);
-            Ray::new(from, DVec3::new(0.5 * random.signed(), 0.5 * random.signed(), -1.0))
+            let from = DVec3::new(random.fraction(), random.fraction(), 0.3);
+            Ray::new(from, DVec3::new(0.5 * random.uniform(-1.0, 1.0), 0.5 * random.uniform(-1.0, 1.0), -1.0))
         })
         .collect();
     let (rate, hits) = rate(&down, |r| mesh.intersect(r, Interval::FORWARD).is_some());
@@ -87,21 +90,21 @@ fn mesh(parts: Parts) {
 fn instances(n: usize) {
     let (positions, triangles) = icosphere(2);
     let ball = Arc::new(Mesh::new(positions, triangles).expect("a ball"));
-    let mut random = Random(2);
+    let mut random = Rng::new(2);
     // About as many of them along a ray whatever their number.
     let size = 0.5 / (n as f64).cbrt();
     let before = resident();
     let mut builder = Scene::builder();
     let (placing, ()) = timed(|| {
         for _ in 0..n {
-            let turn = DQuat::from_axis_angle(random.direction(), random.unit());
-            let place = DAffine3::from_scale_rotation_translation(DVec3::splat(size), turn, random.in_cube());
+            let turn = DQuat::from_axis_angle(random.unit(), random.fraction());
+            let place = DAffine3::from_scale_rotation_translation(DVec3::splat(size), turn, random.in_cube(1.0));
             builder.push(Affine::new(ball.clone(), place).expect("a place"), ());
         }
     });
     let (seconds, scene) = timed(|| builder.build());
     let bytes = (resident() - before) / n as f64;
-    let rays: Vec<Ray> = (0..RAYS).map(|_| Ray::new(2.0 * random.direction(), random.in_cube())).collect();
+    let rays: Vec<Ray> = (0..RAYS).map(|_| Ray::new(2.0 * random.unit(), random.in_cube(1.0))).collect();
     let rays: Vec<Ray> = rays.into_iter().map(|r| Ray::new(r.origin, r.direction - r.origin)).collect();
     let (rate, hits) = rate(&rays, |r| scene.intersect(r, Interval::FORWARD).is_some());
     println!("| {n} | {placing:.3} s | {seconds:.3} s | {bytes:.0} | {rate:.2} ({:.0} % hit) |", 100.0 * hits);

@@ -1,8 +1,12 @@
 //! Sphere, cylinder, cone beside the textbook's kernels, on the same rays: ordinary ones, of which about half hit, and
 //! those that cost more. `cargo bench --bench solids`
 
+#[path = "../tests/support/rng.rs"]
+mod rng;
+
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
+use rng::Rng;
 use std::hint::black_box;
 use truehit::glam::DVec3;
 use truehit::kernel::{frustum, sphere, textbook};
@@ -10,35 +14,6 @@ use truehit::{Hit, Interval, Ray};
 
 const RAYS: usize = 4096;
 const FORWARD: Interval = Interval::FORWARD;
-
-/// splitmix64
-struct Random(u64);
-
-impl Random {
-    fn within(&mut self, lo: f64, hi: f64) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        lo + (hi - lo) * ((z ^ (z >> 31)) >> 11) as f64 / 2f64.powi(53)
-    }
-    fn log(&mut self, lo: f64, hi: f64) -> f64 {
-        self.within(lo.ln(), hi.ln()).exp()
-    }
-    fn cube(&mut self) -> DVec3 {
-        DVec3::new(self.within(-1.0, 1.0), self.within(-1.0, 1.0), self.within(-1.0, 1.0))
-    }
-    fn unit(&mut self) -> DVec3 {
-        loop {
-            let v = self.cube();
-            if (0.1..1.0).contains(&v.length()) {
-                return v.normalize();
-            }
-        }
-    }
-    fn across(&mut self, v: DVec3) -> DVec3 {
-        self.unit().cross(v).normalize_or(v.any_orthonormal_vector())
-    }
-}
 
 /// Times `f`; its hit rate must lie in `hits`.
 fn each<T>(
@@ -61,10 +36,10 @@ struct Ball {
     radius: f64,
 }
 
-fn balls(seed: u64, ray: impl Fn(&mut Random, DVec3, f64) -> Ray) -> Vec<Ball> {
-    let mut r = Random(seed);
+fn balls(seed: u64, ray: impl Fn(&mut Rng, DVec3, f64) -> Ray) -> Vec<Ball> {
+    let mut r = Rng::new(seed);
     let ball = |_| {
-        let (center, radius) = (5.0 * r.cube(), r.log(0.1, 10.0));
+        let (center, radius) = (5.0 * r.in_cube(1.0), r.log(0.1, 10.0));
         Ball { ray: ray(&mut r, center, radius), center, radius }
     };
     (0..RAYS).map(ball).collect()
@@ -74,17 +49,17 @@ fn spheres(criterion: &mut Criterion) {
     let aimed = |distance: f64| {
         balls(1, move |r, center, radius| {
             let u = r.unit();
-            let impact = radius * (2.0 * r.within(0.0, 1.0)).sqrt();
+            let impact = radius * (2.0 * r.uniform(0.0, 1.0)).sqrt();
             Ray::new(center + r.across(u) * impact - u * distance * radius, u * r.log(0.1, 10.0))
         })
     };
     let grazing = balls(2, |r, center, radius| {
         let (u, g) = (r.unit(), r.log(1e-16, 1e-4));
-        let impact = radius * if r.within(0.0, 1.0) < 0.5 { 1.0 + g } else { 1.0 - g };
+        let impact = radius * if r.uniform(0.0, 1.0) < 0.5 { 1.0 + g } else { 1.0 - g };
         Ray::new(center + r.across(u) * impact - u * 3.0 * radius, u)
     });
     let left = balls(3, |r, center, radius| Ray::new(center + r.unit() * radius, r.unit()));
-    let mut tangents = balls(4, |r, _, _| Ray::new((8.0 * r.cube()).round(), DVec3::X));
+    let mut tangents = balls(4, |r, _, _| Ray::new((8.0 * r.in_cube(1.0)).round(), DVec3::X));
     for (i, b) in tangents.iter_mut().enumerate() {
         let (o, d, radius) = [
             (DVec3::new(3.0, 4.0, -7.0), DVec3::Z, 5.0),
@@ -120,19 +95,19 @@ struct Trunk {
 }
 
 fn frusta(criterion: &mut Criterion) {
-    let mut r = Random(5);
+    let mut r = Rng::new(5);
     for name in ["cylinder", "cone", "truncated cone"] {
         let trunk = |_| {
-            let (base, axis, radius) = (5.0 * r.cube(), r.unit() * r.log(0.1, 10.0), r.log(0.1, 10.0));
+            let (base, axis, radius) = (5.0 * r.in_cube(1.0), r.unit() * r.log(0.1, 10.0), r.log(0.1, 10.0));
             let radii = match name {
                 "cylinder" => [radius; 2],
                 "cone" => [radius, 0.0],
                 _ => [radius, r.log(0.1, 10.0)],
             };
             let size = radii[0].max(radii[1]).max(axis.length());
-            let target = base + axis * r.within(0.0, 1.0) + r.unit() * size * r.within(0.0, 1.2);
+            let target = base + axis * r.uniform(0.0, 1.0) + r.unit() * size * r.uniform(0.0, 1.2);
             let u = r.unit();
-            let origin = target - u * r.within(2.0, 10.0) * size;
+            let origin = target - u * r.uniform(2.0, 10.0) * size;
             Trunk { ray: Ray::new(origin, u * r.log(0.1, 10.0)), base, top: base + axis, radii }
         };
         let cases: Vec<Trunk> = (0..RAYS).map(trunk).collect();

@@ -1,8 +1,9 @@
 //! The tree over boxes, against a loop over them, for boxes of every kind.
 
-mod meshes;
+#[path = "support/rng.rs"]
+mod rng;
 
-use meshes::Random;
+use rng::Rng;
 use std::ops::ControlFlow;
 use truehit::bvh::{Bvh, Level};
 use truehit::glam::DVec3;
@@ -14,50 +15,50 @@ fn at(center: DVec3, half: DVec3) -> Aabb {
 }
 
 /// Boxes that make trouble, by name.
-fn families(n: usize, random: &mut Random) -> Vec<(&'static str, Vec<Aabb>)> {
+fn families(n: usize, random: &mut Rng) -> Vec<(&'static str, Vec<Aabb>)> {
     let mut family =
-        |name, f: &mut dyn FnMut(&mut Random, usize) -> Aabb| (name, (0..n).map(|i| f(random, i)).collect::<Vec<_>>());
-    let size = |r: &mut Random, e: f64| 10f64.powf(e * r.unit());
+        |name, f: &mut dyn FnMut(&mut Rng, usize) -> Aabb| (name, (0..n).map(|i| f(random, i)).collect::<Vec<_>>());
+    let size = |r: &mut Rng, e: f64| 10f64.powf(e * r.fraction());
     vec![
-        family("cubes", &mut |r, _| at(r.in_cube(), DVec3::splat(0.1 * r.unit()))),
-        family("points", &mut |r, _| at(r.in_cube(), DVec3::ZERO)),
-        family("one centre", &mut |r, _| at(DVec3::ONE, r.in_cube().abs())),
+        family("cubes", &mut |r, _| at(r.in_cube(1.0), DVec3::splat(0.1 * r.fraction()))),
+        family("points", &mut |r, _| at(r.in_cube(1.0), DVec3::ZERO)),
+        family("one centre", &mut |r, _| at(DVec3::ONE, r.in_cube(1.0).abs())),
         family("one box", &mut |_, _| Aabb::new([0.0; 3], [1.0; 3])),
-        family("needles", &mut |r, _| at(r.in_cube(), DVec3::new(0.5 * r.unit(), 1e-9, 1e-9))),
-        family("1e9 to 1", &mut |r, _| at(DVec3::new(1e9, 1.0, 1.0) * r.in_cube(), r.in_cube().abs())),
-        family("of all sizes", &mut |r, _| at(size(r, -12.0) * r.in_cube(), size(r, -12.0) * DVec3::ONE)),
-        family("beyond f32", &mut |r, _| at(1e200 * r.in_cube(), 1e199 * DVec3::splat(r.unit()))),
-        family("subnormal", &mut |r, _| at(1e-310 * r.in_cube(), 1e-311 * DVec3::splat(r.unit()))),
-        family("far away", &mut |r, _| at(1e12 + r.in_cube(), DVec3::splat(0.1 * r.unit()))),
+        family("needles", &mut |r, _| at(r.in_cube(1.0), DVec3::new(0.5 * r.fraction(), 1e-9, 1e-9))),
+        family("1e9 to 1", &mut |r, _| at(DVec3::new(1e9, 1.0, 1.0) * r.in_cube(1.0), r.in_cube(1.0).abs())),
+        family("of all sizes", &mut |r, _| at(size(r, -12.0) * r.in_cube(1.0), size(r, -12.0) * DVec3::ONE)),
+        family("beyond f32", &mut |r, _| at(1e200 * r.in_cube(1.0), 1e199 * DVec3::splat(r.fraction()))),
+        family("subnormal", &mut |r, _| at(1e-310 * r.in_cube(1.0), 1e-311 * DVec3::splat(r.fraction()))),
+        family("far away", &mut |r, _| at(1e12 + r.in_cube(1.0), DVec3::splat(0.1 * r.fraction()))),
         family("halving", &mut |_, i| at(DVec3::splat(0.5f64.powi(i as i32)), DVec3::splat(0.5f64.powi(i as i32 + 3)))),
         family("odd ones among them", &mut |r, i| match i % 7 {
             0 => Aabb::EMPTY,
             1 => Aabb::EVERYTHING,
             2 => Aabb { min: DVec3::NAN, max: DVec3::ONE },
             3 => Aabb { min: DVec3::ZERO, max: DVec3::new(f64::INFINITY, 1.0, 1.0) },
-            _ => at(r.in_cube(), DVec3::splat(0.1)),
+            _ => at(r.in_cube(1.0), DVec3::splat(0.1)),
         }),
     ]
 }
 
 /// Towards a point of one of the boxes, and some that are parallel to an axis.
-fn aimed(boxes: &[Aabb], random: &mut Random) -> (Ray, Interval) {
+fn aimed(boxes: &[Aabb], random: &mut Rng) -> (Ray, Interval) {
     let finite = |b: &Aabb| b.is_finite() && !b.is_empty();
     let mut pick = || loop {
-        let b = boxes[random.below(boxes.len())];
+        let b = boxes[random.index(boxes.len())];
         if finite(&b) {
-            let w = DVec3::new(random.unit(), random.unit(), random.unit());
+            let w = DVec3::new(random.fraction(), random.fraction(), random.fraction());
             break b.min + w * (b.max - b.min);
         }
     };
     let (a, b) = (pick(), pick());
     let size = (b - a).abs().max_element().max(a.abs().max_element() * 1e-3).max(1e-320);
-    let mut direction = b - a + 0.1 * size * random.in_cube();
-    if random.below(4) == 0 {
-        direction[random.below(3)] = 0.0;
+    let mut direction = b - a + 0.1 * size * random.in_cube(1.0);
+    if random.index(4) == 0 {
+        direction[random.index(3)] = 0.0;
     }
-    let origin = if random.below(2) == 0 { a } else { a - 3.0 * direction };
-    let within = match random.below(3) {
+    let origin = if random.index(2) == 0 { a } else { a - 3.0 * direction };
+    let within = match random.index(3) {
         0 => Interval::FORWARD,
         1 => Interval::new(-1.0, 0.75),
         _ => Interval::new(0.5, 2.0),
@@ -78,7 +79,7 @@ fn met(b: &Aabb, ray: &Ray, within: Interval) -> Option<f64> {
 
 #[test]
 fn no_box_that_a_ray_meets_is_left_out() {
-    let mut random = Random(1);
+    let mut random = Rng::new(1);
     let (mut rays, mut boxes_met, mut visited_in_all) = (0, 0, 0);
     for n in [1, 2, 3, 8, 9, 65, 700] {
         for (name, boxes) in families(n, &mut random) {
@@ -134,12 +135,12 @@ fn no_box_that_a_ray_meets_is_left_out() {
 /// Among many boxes few are visited: the tree prunes.
 #[test]
 fn most_boxes_are_not_visited() {
-    let mut random = Random(2);
-    let boxes: Vec<Aabb> = (0..20_000).map(|_| at(random.in_cube(), DVec3::splat(0.01))).collect();
+    let mut random = Rng::new(2);
+    let boxes: Vec<Aabb> = (0..20_000).map(|_| at(random.in_cube(1.0), DVec3::splat(0.01))).collect();
     let tree = Bvh::build(&boxes);
     let mut visits = 0;
     for _ in 0..1000 {
-        tree.closest(&Ray::new(random.in_cube(), random.direction()), Interval::FORWARD, |_, bound| {
+        tree.closest(&Ray::new(random.in_cube(1.0), random.unit()), Interval::FORWARD, |_, bound| {
             visits += 1;
             bound
         });
@@ -151,8 +152,8 @@ fn most_boxes_are_not_visited() {
 /// The same tree at any number of threads, and with an observer.
 #[test]
 fn neither_threads_nor_observers_change_the_tree() {
-    let mut random = Random(3);
-    let boxes: Vec<Aabb> = (0..30_000).map(|_| at(random.in_cube(), 0.02 * random.in_cube().abs())).collect();
+    let mut random = Rng::new(3);
+    let boxes: Vec<Aabb> = (0..30_000).map(|_| at(random.in_cube(1.0), 0.02 * random.in_cube(1.0).abs())).collect();
     let alone = format!("{:?}", Bvh::build(&boxes));
     assert!(alone.len() > 1_000_000);
     let observed = Bvh::build_observed(&boxes, &mut |_| ControlFlow::Continue(())).expect("nobody stops it");
@@ -166,8 +167,8 @@ fn neither_threads_nor_observers_change_the_tree() {
 
 #[test]
 fn observers_see_a_build_advance_and_can_end_it() {
-    let mut random = Random(4);
-    let boxes: Vec<Aabb> = (0..50_000).map(|_| at(random.in_cube(), DVec3::splat(0.01))).collect();
+    let mut random = Rng::new(4);
+    let boxes: Vec<Aabb> = (0..50_000).map(|_| at(random.in_cube(1.0), DVec3::splat(0.01))).collect();
     let mut shares = Vec::new();
     let tree = Bvh::build_observed(&boxes, &mut |share| {
         shares.push(share);

@@ -2,11 +2,9 @@
 
 mod support;
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use support::cases::{Case, Family, Kernel};
 use support::families;
-use support::sweep::{Contender, Row, SHIPPED, TEXTBOOK, quantile, sweep};
+use support::sweep::{Contender, Counts, Row, SHIPPED, TEXTBOOK, on_all_cores, quantile, sweep};
 
 /// Families in which everything is a miss.
 const ALL_MISS: [(Kernel, u32); 8] = [
@@ -33,40 +31,26 @@ fn print(family: &Family, row: &Row) {
         family.kernel.name(),
         family.number,
         family.name,
-        row.cases,
-        row.hits,
-        row.wrong(),
-        row.borderline,
-        row.wrong_parts,
-        row.max_ulps(),
+        row.counts.cases,
+        row.counts.hits,
+        row.counts.wrong(),
+        row.counts.borderline,
+        row.counts.wrong_parts,
+        row.counts.max_ulps,
         quantile(&row.ulps, 0.99),
-        row.violations,
+        row.counts.violations,
         quantile(&row.tightness, 0.5),
     );
 }
 
 /// What came out of all families.
 fn counts<'a>(rows: impl IntoIterator<Item = &'a Row>) -> String {
-    let mut total = Row::default();
-    let mut ulps = 0.0f64;
-    for row in rows {
-        ulps = ulps.max(row.max_ulps());
-        total.cases += row.cases;
-        total.hits += row.hits;
-        total.false_hits += row.false_hits;
-        total.false_misses += row.false_misses;
-        total.borderline += row.borderline;
-        total.wrong_parts += row.wrong_parts;
-        total.violations += row.violations;
-    }
+    let mut total = Counts::default();
+    rows.into_iter().for_each(|row| total += row.counts);
+    let Counts { cases, hits, borderline, wrong_parts, violations, max_ulps, .. } = total;
+    let wrong = total.wrong();
     format!(
-        "{} cases, {} hits, {} wrong, {} edge, {} wrong parts, {} bounds broken, {ulps:.3} ulp at most",
-        total.cases,
-        total.hits,
-        total.wrong(),
-        total.borderline,
-        total.wrong_parts,
-        total.violations
+        "{cases} cases, {hits} hits, {wrong} wrong, {borderline} edge, {wrong_parts} wrong parts, {violations} bounds broken, {max_ulps:.3} ulp at most"
     )
 }
 
@@ -81,25 +65,20 @@ fn rows(contender: &Contender, kernel: Kernel, ordinary: usize, hard: usize) -> 
         .collect();
     // All families side by side, so that what a run has done so far is a fair part of it.
     chunks.sort_by(|(j, a), (k, b)| (a.start * of(*k)).cmp(&(b.start * of(*j))));
-    let rows = Mutex::new(vec![Row::default(); families.len()]);
-    let next = AtomicUsize::new(0);
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(|| {
-                loop {
-                    let i = next.fetch_add(1, Ordering::Relaxed);
-                    let Some((k, range)) = chunks.get(i) else { break };
-                    let row = sweep(&families[*k], contender.answer, range.clone());
-                    let mut rows = rows.lock().unwrap();
-                    rows[*k].merge(row);
-                    if i % 250 == 249 {
-                        eprintln!("{} so far: {}", kernel.name(), counts(rows.iter()));
-                    }
-                }
-            });
-        }
-    });
-    families.into_iter().zip(rows.into_inner().unwrap()).collect()
+    let mut rows = vec![Row::default(); families.len()];
+    let mut finished = 0;
+    on_all_cores(
+        chunks.len(),
+        |i| sweep(&families[chunks[i].0], contender.answer, chunks[i].1.clone()),
+        |i, row| {
+            rows[chunks[i].0].merge(row);
+            finished += 1;
+            if finished % 250 == 0 {
+                eprintln!("{} so far: {}", kernel.name(), counts(&rows));
+            }
+        },
+    );
+    families.into_iter().zip(rows).collect()
 }
 
 /// The harness sees what is known to be wrong: the textbook kernels err on hard cases, and on ordinary ones hardly.
@@ -111,13 +90,13 @@ fn textbook_kernels_show_their_errors() {
         println!("{}", contender.name);
         for (family, row) in &rows {
             print(family, row);
-            assert_eq!(row.hits == 0, ALL_MISS.contains(&(family.kernel, family.number)), "{}", family.name);
-            assert_eq!(row.violations, 0, "an infinite bound holds");
+            assert_eq!(row.counts.hits == 0, ALL_MISS.contains(&(family.kernel, family.number)), "{}", family.name);
+            assert_eq!(row.counts.violations, 0, "an infinite bound holds");
             if family.number == 0 {
-                assert!(row.wrong() * 200 <= row.cases, "{} on ordinary rays", contender.name);
+                assert!(row.counts.wrong() * 200 <= row.counts.cases, "{} on ordinary rays", contender.name);
             }
         }
-        let wrong: usize = rows.iter().map(|(_, row)| row.wrong()).sum();
+        let wrong: usize = rows.iter().map(|(_, row)| row.counts.wrong()).sum();
         assert!(wrong > 0, "{} is never wrong on hard cases?", contender.name);
     }
 }
@@ -134,13 +113,14 @@ fn check(kernel: Kernel, ordinary: usize, hard: usize) {
             format!("{} {} {}: {what}: {}", kernel.name(), family.number, family.name, case.hex())
         };
         broken.extend(row.failures.iter().map(|(what, case)| named(what, case)));
-        if let Some((ulps, case)) = &row.worst
-            && (*ulps > family.contract() || ulps.is_nan())
+        let ulps = row.counts.max_ulps;
+        if let Some(case) = &row.worst
+            && (ulps > family.contract() || ulps.is_nan())
         {
             broken.push(named(&format!("{ulps} ulp"), case));
         }
         let misses = ALL_MISS.contains(&(kernel, family.number));
-        assert_eq!(row.hits == 0, misses, "{}: {} hits", family.name, row.hits);
+        assert_eq!(row.counts.hits == 0, misses, "{}: {} hits", family.name, row.counts.hits);
     }
     println!("{}: {}", kernel.name(), counts(rows.iter().map(|(_, row)| row)));
     assert!(broken.is_empty(), "\n{}", broken.join("\n"));

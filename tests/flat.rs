@@ -7,6 +7,7 @@ use std::cmp::Ordering;
 use std::fmt::Debug;
 use support::cases::{Case, Kernel, Solid};
 use support::families;
+use support::rng::Rng;
 use support::shapes::{as_stored, shape};
 use support::sweep::{Row, quantile, sweep};
 use truehit::glam::DVec2;
@@ -116,46 +117,6 @@ fn ulp(x: f64) -> f64 {
     x.next_up() - x
 }
 
-/// A small generator: splitmix64.
-struct Random(u64);
-
-impl Random {
-    fn named(name: &str) -> Self {
-        Self(name.bytes().fold(7, |h, b| h * 31 % 1_000_003 + u64::from(b)))
-    }
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-    fn below(&mut self, n: u64) -> u64 {
-        self.bits() % n
-    }
-    fn of<T: Copy>(&mut self, choices: &[T]) -> T {
-        choices[self.below(choices.len() as u64) as usize]
-    }
-    fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / 2f64.powi(53)
-    }
-    fn range(&mut self, a: f64, b: f64) -> f64 {
-        a + (b - a) * self.unit()
-    }
-    /// 10^uniform(a, b)
-    fn log(&mut self, a: f64, b: f64) -> f64 {
-        10f64.powf(self.range(a, b))
-    }
-    fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.range(-1.0, 1.0), self.range(-1.0, 1.0), self.range(-1.0, 1.0))
-    }
-    fn integer(&mut self, n: u64) -> f64 {
-        self.below(2 * n + 1) as f64 - n as f64
-    }
-    fn grid(&mut self, n: u64) -> DVec3 {
-        DVec3::new(self.integer(n), self.integer(n), self.integer(n))
-    }
-}
-
 /// What one family showed.
 #[derive(Debug, Default)]
 struct Report {
@@ -220,9 +181,9 @@ fn triangles(
     count: u32,
     min_hits: u32,
     max_ulp: f64,
-    mut make: impl FnMut(&mut Random) -> (Ray, [DVec3; 3], Interval),
+    mut make: impl FnMut(&mut Rng) -> (Ray, [DVec3; 3], Interval),
 ) {
-    let mut random = Random::named(name);
+    let mut random = Rng::named(name);
     let mut report = Report::default();
     for _ in 0..count {
         let (ray, t, within) = make(&mut random);
@@ -234,19 +195,19 @@ fn triangles(
     report.finish(name, min_hits, max_ulp);
 }
 
-fn around(r: &mut Random, t: &[DVec3; 3]) -> DVec3 {
-    let (u, v) = (r.range(-0.1, 1.1), r.range(-0.1, 1.1));
+fn around(r: &mut Rng, t: &[DVec3; 3]) -> DVec3 {
+    let (u, v) = (r.uniform(-0.1, 1.1), r.uniform(-0.1, 1.1));
     let (u, v) = if u + v > 1.1 { (1.0 - u, 1.0 - v) } else { (u, v) };
     t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0])
 }
 
-fn some_triangle(r: &mut Random) -> [DVec3; 3] {
-    [r.vector(), r.vector(), r.vector()]
+fn some_triangle(r: &mut Rng) -> [DVec3; 3] {
+    [r.in_cube(1.0), r.in_cube(1.0), r.in_cube(1.0)]
 }
 
-fn sliver(r: &mut Random) -> [DVec3; 3] {
+fn sliver(r: &mut Rng) -> [DVec3; 3] {
     let [a, b, _] = some_triangle(r);
-    [a, b, a + (b - a) * r.unit() + r.vector() * r.log(-9.0, -3.0)]
+    [a, b, a + (b - a) * r.fraction() + r.in_cube(1.0) * r.decades(-9.0, -3.0)]
 }
 
 fn normal(t: &[DVec3; 3]) -> DVec3 {
@@ -264,19 +225,19 @@ const ANY: f64 = f64::INFINITY;
 #[test]
 fn triangles_on_ordinary_rays() {
     triangles("ordinary", 20000, 6000, 1.0, |r| {
-        let (t, o) = (some_triangle(r), 5.0 * r.vector());
+        let (t, o) = (some_triangle(r), 5.0 * r.in_cube(1.0));
         let p = around(r, &t);
-        (Ray::new(o, (p - o) * r.log(-2.0, 2.0)), t, F)
+        (Ray::new(o, (p - o) * r.decades(-2.0, 2.0)), t, F)
     });
-    triangles("anywhere", 5000, 100, 1.0, |r| (Ray::new(r.vector(), r.vector()), some_triangle(r), L));
+    triangles("anywhere", 5000, 100, 1.0, |r| (Ray::new(r.in_cube(1.0), r.in_cube(1.0)), some_triangle(r), L));
     triangles("far (13)", 10000, 3000, 1.0, |r| {
-        let (t, o) = (some_triangle(r), r.vector().normalize() * r.log(3.0, 12.0));
+        let (t, o) = (some_triangle(r), r.in_cube(1.0).normalize() * r.decades(3.0, 12.0));
         (towards(o, around(r, &t)), t, F)
     });
     triangles("on the plane (24)", 10000, 2000, ANY, |r| {
         let t = some_triangle(r);
         let o = around(r, &t);
-        (Ray::new(o, r.vector() * r.log(2.0, 8.0)), t, L)
+        (Ray::new(o, r.in_cube(1.0) * r.decades(2.0, 8.0)), t, L)
     });
 }
 
@@ -285,13 +246,13 @@ fn triangles_near_parallel_to_the_ray() {
     triangles("grazing (7)", 10000, 2000, 4.0, |r| {
         let t = some_triangle(r);
         let (n, p) = (normal(&t), around(r, &t));
-        let o = p - 3.0 * n.cross(r.vector()).normalize() + n * r.log(-16.0, -3.0);
+        let o = p - 3.0 * n.cross(r.in_cube(1.0)).normalize() + n * r.decades(-16.0, -3.0);
         (towards(o, p), t, L)
     });
     triangles("in plane (8)", 4000, 0, 4.0, |r| {
         let t = [r.grid(5), r.grid(5), r.grid(5)];
         let (e1, e2) = (t[1] - t[0], t[2] - t[0]);
-        let mut along = || e1 * r.integer(4) + e2 * r.integer(4);
+        let mut along = || e1 * r.whole(4) + e2 * r.whole(4);
         (Ray::new(along() + t[0], along()), t, L)
     });
     triangles("along an edge (9)", 4000, 0, 4.0, |r| {
@@ -299,18 +260,18 @@ fn triangles_near_parallel_to_the_ray() {
         (towards(t[0], t[1]), t, L)
     });
     triangles("slivers (40)", 10000, 3000, 4.0, |r| {
-        let (t, o) = (sliver(r), 4.0 * r.vector());
+        let (t, o) = (sliver(r), 4.0 * r.in_cube(1.0));
         (towards(o, around(r, &t)), t, F)
     });
     triangles("slivers, grazing (41)", 10000, 1000, 4.0, |r| {
         let t = sliver(r);
         let (n, p) = (normal(&t), around(r, &t));
-        let o = p - 3.0 * n.cross(r.vector()).normalize() + n * r.log(-10.0, -3.0);
+        let o = p - 3.0 * n.cross(r.in_cube(1.0)).normalize() + n * r.decades(-10.0, -3.0);
         (towards(o, p), t, L)
     });
     triangles("collinear (42-44)", 5000, 0, 4.0, |r| {
         let (a, e, o) = (r.grid(9), r.grid(9), r.grid(9));
-        let t = [a, a + e * r.integer(1), a + e * r.integer(2)];
+        let t = [a, a + e * r.whole(1), a + e * r.whole(2)];
         (towards(o, a + e * 0.5), t, L)
     });
 }
@@ -318,30 +279,32 @@ fn triangles_near_parallel_to_the_ray() {
 #[test]
 fn triangles_at_every_scale() {
     triangles("scale (15-19, 22)", 20000, 5000, 4.0, |r| {
-        let (k, kd) = (2f64.powi(r.integer(300) as i32), 2f64.powi(r.integer(450) as i32));
-        let (t, o) = (some_triangle(r), 3.0 * r.vector());
+        let (k, kd) = (2f64.powi(r.whole(300) as i32), 2f64.powi(r.whole(450) as i32));
+        let (t, o) = (some_triangle(r), 3.0 * r.in_cube(1.0));
         let p = around(r, &t);
         (Ray::new(k * o, kd * (p - o)), t.map(|v| k * v), F)
     });
     triangles("subnormal direction (21)", 4000, 500, ANY, |r| {
-        let (t, o) = (some_triangle(r), 3.0 * r.vector());
-        let d = (around(r, &t) - o) * r.log(-323.0, -305.0);
+        let (t, o) = (some_triangle(r), 3.0 * r.in_cube(1.0));
+        let d = (around(r, &t) - o) * r.decades(-323.0, -305.0);
         (Ray::new(o, if d == DVec3::ZERO { DVec3::X * 5e-324 } else { d }), t, F)
     });
     triangles("every magnitude", 10000, 1000, ANY, |r| {
-        let k = r.log(-320.0, 300.0);
+        let k = r.decades(-320.0, 300.0);
         let t = some_triangle(r).map(|v| v * k);
-        let o = 3.0 * r.vector() * k * r.log(-3.0, 3.0);
+        let o = 3.0 * r.in_cube(1.0) * k * r.decades(-3.0, 3.0);
         let p = around(r, &t) - o;
-        let d = p * r.log(-300.0, 300.0);
+        let d = p * r.decades(-300.0, 300.0);
         (Ray::new(o, if d.is_finite() && d != DVec3::ZERO { d } else { DVec3::Z }), t, L)
     });
     triangles("every component", 10000, 100, ANY, |r| {
-        let mut v = || DVec3::new(r.log(-320.0, 308.0), r.log(-320.0, 308.0), r.log(-320.0, 308.0)) * r.vector();
+        let mut v = || {
+            DVec3::new(r.decades(-320.0, 308.0), r.decades(-320.0, 308.0), r.decades(-320.0, 308.0)) * r.in_cube(1.0)
+        };
         (Ray::new(v(), v() + DVec3::splat(5e-324)), [v(), v(), v()], L)
     });
     triangles("area underflows (45)", 4000, 1000, 4.0, |r| {
-        let (t, o) = (some_triangle(r).map(|v| v * 1e-170), 3e-170 * r.vector());
+        let (t, o) = (some_triangle(r).map(|v| v * 1e-170), 3e-170 * r.in_cube(1.0));
         (Ray::new(o, (around(r, &t) - o) * 1e170), t, F)
     });
 }
@@ -350,20 +313,20 @@ fn triangles_at_every_scale() {
 fn triangles_on_edges_and_vertices() {
     triangles("edge points, dyadic (31)", 10000, 9000, 4.0, |r| {
         let t = [8.0 * r.grid(20), 8.0 * r.grid(20), 8.0 * r.grid(20)];
-        let (a, b) = (r.of(&t), r.of(&t));
+        let (a, b) = (r.pick(&t), r.pick(&t));
         (towards(r.grid(1000) * 0.125, a + 0.125 * r.below(9) as f64 * (b - a)), t, L)
     });
     triangles("edge points, rounded (32)", 10000, 3000, 4.0, |r| {
-        let (t, o) = (some_triangle(r), 4.0 * r.vector());
-        let (a, b) = (r.of(&t), r.of(&t));
-        (towards(o, a + r.unit() * (b - a)), t, F)
+        let (t, o) = (some_triangle(r), 4.0 * r.in_cube(1.0));
+        let (a, b) = (r.pick(&t), r.pick(&t));
+        (towards(o, a + r.fraction() * (b - a)), t, F)
     });
     triangles("vertices (33)", 10000, 1000, 4.0, |r| {
-        let (t, o) = (some_triangle(r), 4.0 * r.vector());
-        (towards(o, r.of(&t)), t, F)
+        let (t, o) = (some_triangle(r), 4.0 * r.in_cube(1.0));
+        (towards(o, r.pick(&t)), t, F)
     });
     triangles("grid and axis (38, 58)", 10000, 300, 4.0, |r| {
-        let axis = r.of(&[DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::new(-0.0, 0.0, -1.0)]);
+        let axis = r.pick(&[DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::new(-0.0, 0.0, -1.0)]);
         (Ray::new(r.grid(3), axis), [r.grid(3), r.grid(3), r.grid(3)], L)
     });
     triangles("leg 2e-4 (23)", 1, 1, 1.0, |_| {
@@ -376,22 +339,22 @@ fn triangles_on_edges_and_vertices() {
 #[test]
 fn triangle_intervals_are_open() {
     triangles("interval limits (63)", 10000, 1000, 4.0, |r| {
-        let z = r.integer(9);
+        let z = r.whole(9);
         let t = [DVec3::new(-9.0, -9.0, z), DVec3::new(9.0, -9.0, z), DVec3::new(0.0, 9.0, z)];
-        let ray = Ray::new([r.range(-1.0, 1.0), 0.0, r.integer(9)], [0.0, 0.0, r.integer(2) + 2.5]);
+        let ray = Ray::new([r.uniform(-1.0, 1.0), 0.0, r.whole(9)], [0.0, 0.0, r.whole(2) + 2.5]);
         let lambda = (z - ray.origin.z) / ray.direction.z;
         let limits = [lambda, lambda.next_up(), lambda.next_down(), f64::NEG_INFINITY, f64::INFINITY, -0.0];
-        (ray, t, Interval::new(r.of(&limits), r.of(&limits)))
+        (ray, t, Interval::new(r.pick(&limits), r.pick(&limits)))
     });
 }
 
 #[test]
 fn triangles_take_any_input() {
     let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, 5e-324, 0.0];
-    let mut r = Random::named("bad");
+    let mut r = Rng::named("bad");
     let mut answers = [0u32; 2];
     for _ in 0..100_000 {
-        let mut x: Vec<f64> = (0..17).map(|_| if r.below(6) == 0 { r.of(&bad) } else { r.integer(3) }).collect();
+        let mut x: Vec<f64> = (0..17).map(|_| if r.below(6) == 0 { r.pick(&bad) } else { r.whole(3) }).collect();
         if r.below(3) == 0 {
             x[3..6].fill(0.0);
         }
@@ -410,16 +373,16 @@ fn triangles_take_any_input() {
 
 #[test]
 fn comparisons_of_two_triangles_are_exact() {
-    let mut r = Random::named("compare");
+    let mut r = Rng::named("compare");
     let mut seen = [0u32; 3];
     for i in 0..20000 {
         let (t, o) = match i % 3 {
             0 => ([r.grid(9), r.grid(9), r.grid(9)], r.grid(50)),
-            _ => (some_triangle(&mut r), 4.0 * r.vector()),
+            _ => (some_triangle(&mut r), 4.0 * r.in_cube(1.0)),
         };
         let w = match i % 2 {
             0 => r.grid(9),
-            _ => r.vector(),
+            _ => r.in_cube(1.0),
         };
         // The second shares an edge that the ray meets, exactly or nearly.
         let s = [t[1], t[0], w];
@@ -447,9 +410,9 @@ fn families_of(kernel: Kernel, cases: usize, answer: fn(&Case) -> Option<Hit>) {
     for family in families::all().into_iter().filter(|f| f.kernel == kernel) {
         let row = sweep(&family, answer, 0..cases);
         show(kernel, family.number, family.name, &row);
-        assert_eq!((row.wrong(), row.violations), (0, 0), "{}", family.name);
-        assert!(row.max_ulps() <= kernel.contract(), "{}", family.name);
-        hits += row.hits;
+        assert_eq!((row.counts.wrong(), row.counts.violations), (0, 0), "{}", family.name);
+        assert!(row.counts.max_ulps <= kernel.contract(), "{}", family.name);
+        hits += row.counts.hits;
     }
     assert!(hits > cases, "only {hits} hits");
 }
@@ -501,11 +464,11 @@ fn show(kernel: Kernel, number: u32, name: &str, row: &Row) {
     println!(
         "{:<9} {number:>3} {name:<40} cases {} hits {:>6} wrong {} violated {} max ulp {:.4} median bound/err {:.2}",
         kernel.name(),
-        row.cases,
-        row.hits,
-        row.wrong(),
-        row.violations,
-        row.max_ulps(),
+        row.counts.cases,
+        row.counts.hits,
+        row.counts.wrong(),
+        row.counts.violations,
+        row.counts.max_ulps,
         quantile(&row.tightness, 0.5),
     );
     for (what, case) in &row.failures {
@@ -524,9 +487,9 @@ fn affine_maps_in_every_family() {
             row.add(&case, hit);
         }
         show(Kernel::Affine, family.number, family.name, &row);
-        assert_eq!((row.wrong(), row.violations), (0, 0), "{}", family.name);
-        assert!(row.max_ulps() <= family.contract(), "{}", family.name);
-        assert!(row.hits > 300, "{}", family.name);
+        assert_eq!((row.counts.wrong(), row.counts.violations), (0, 0), "{}", family.name);
+        assert!(row.counts.max_ulps <= family.contract(), "{}", family.name);
+        assert!(row.counts.hits > 300, "{}", family.name);
     }
 }
 
@@ -570,29 +533,30 @@ fn constructors_name_what_they_refuse() {
 /// box, the normal is the gradient, pointer and value agree, a spawned ray leaves.
 #[test]
 fn shapes_under_maps_keep_their_promises() {
-    let mut r = Random::named("maps");
+    let mut r = Rng::named("maps");
     let pentagram =
         [[0.0, 5.0], [3.0, -4.0], [-5.0, 2.0], [5.0, 2.0], [-3.0, -4.0]].map(|[x, y]| DVec3::new(x, y, 1.0));
     let mut seen = [0u32; 2];
     for i in 0..6000 {
         let inner: Box<dyn Shape> = match i % 5 {
             0 => Box::new(Sphere::UNIT),
-            1 => Box::new(Triangle::new(r.vector(), r.vector(), r.vector()).unwrap()),
+            1 => Box::new(Triangle::new(r.in_cube(1.0), r.in_cube(1.0), r.in_cube(1.0)).unwrap()),
             2 => Box::new(Polygon::new(&pentagram).unwrap()),
             3 => Box::new(Cylinder::new([0.0; 3], [0.0, 1.0, 2.0], 0.5).unwrap()),
-            _ => Box::new(Plane::new(r.vector(), r.vector()).unwrap()),
+            _ => Box::new(Plane::new(r.in_cube(1.0), r.in_cube(1.0)).unwrap()),
         };
-        let turn = |r: &mut Random| DMat3::from_quat(DQuat::from_axis_angle(r.vector().normalize(), r.range(0.0, 6.0)));
+        let turn =
+            |r: &mut Rng| DMat3::from_quat(DQuat::from_axis_angle(r.in_cube(1.0).normalize(), r.uniform(0.0, 6.0)));
         let mirror = if i % 2 == 0 { 1.0 } else { -1.0 };
-        let scale = DVec3::new(mirror * r.log(-1.0, 1.0), r.log(-1.0, 1.0), r.log(-1.0, 1.0));
+        let scale = DVec3::new(mirror * r.decades(-1.0, 1.0), r.decades(-1.0, 1.0), r.decades(-1.0, 1.0));
         let offset = if i % 3 == 0 { 1e6 } else { 3.0 };
         let map = DAffine3 {
             matrix3: turn(&mut r) * DMat3::from_diagonal(scale) * turn(&mut r),
-            translation: offset * r.vector(),
+            translation: offset * r.in_cube(1.0),
         };
         let shape = Affine::new(inner, map).unwrap();
-        let target = map.transform_point3(0.7 * r.vector() + DVec3::Z * if i % 5 == 2 { 1.0 } else { 0.0 });
-        let origin = target + 10.0 * r.vector();
+        let target = map.transform_point3(0.7 * r.in_cube(1.0) + DVec3::Z * if i % 5 == 2 { 1.0 } else { 0.0 });
+        let origin = target + 10.0 * r.in_cube(1.0);
         let ray = towards(origin, target);
         let Some(hit) = shape.intersect(&ray, F) else {
             assert!(!shape.occludes(&ray, F));
@@ -619,7 +583,7 @@ fn shapes_under_maps_keep_their_promises() {
         assert!((across.normalize() - object_normal).length() < 1e-7, "{across} {object_normal}");
         let surface = truehit::Surface::new(&shape, &ray, &hit);
         for _ in 0..3 {
-            let direction = r.vector();
+            let direction = r.in_cube(1.0);
             let away = surface.spawn(direction);
             let outward = direction.dot(normal) > 1e-6;
             // A flat shape is never met again; a solid not from outside.

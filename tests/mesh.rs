@@ -1,10 +1,13 @@
 //! A mesh answers what a loop over its triangles answers, to the bit, and nothing slips through.
 
 mod meshes;
+mod support;
 
 use glam::DVec3;
-use meshes::{Parts, Random, grid_cube, icosphere, moved, soup, torus};
+use meshes::{Parts, grid_cube, icosphere, moved, soup, torus};
 use std::cmp::Ordering;
+use support::rng::{self, Rng};
+use support::sweep::on_all_cores;
 use truehit::bvh::Level;
 use truehit::kernel::triangle;
 use truehit::{Hit, Interval, Mesh, Ray, Shape, glam};
@@ -27,43 +30,43 @@ fn brute_force(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
 }
 
 /// A ray at something of the mesh, from somewhere around it: (ray, interval).
-fn aimed(mesh: &Mesh, random: &mut Random) -> (Ray, Interval) {
-    let [a, b, c] = mesh.vertices(random.below(mesh.triangles().len()) as u32);
-    let target = match random.below(5) {
+fn aimed(mesh: &Mesh, random: &mut Rng) -> (Ray, Interval) {
+    let [a, b, c] = mesh.vertices(random.index(mesh.triangles().len()) as u32);
+    let target = match random.index(5) {
         0 => a,
         1 => 0.5 * (a + b),
-        2 => a + random.unit() * (c - a),
+        2 => a + random.fraction() * (c - a),
         3 => 0.25 * a + 0.5 * b + 0.25 * c,
-        _ => a + random.in_cube() * (b - a).length(),
+        _ => a + random.in_cube(1.0) * (b - a).length(),
     };
     let (middle, size) = (mesh.bounds().center(), mesh.bounds().size().length());
-    let origin = match random.below(6) {
-        0 => middle + 0.5 * size * random.in_cube(),
-        1 => middle + size * random.in_cube(),
-        2 => middle + 1e3 * size * random.in_cube(),
-        3 => middle + 1e7 * size * random.in_cube(),
+    let origin = match random.index(6) {
+        0 => middle + 0.5 * size * random.in_cube(1.0),
+        1 => middle + size * random.in_cube(1.0),
+        2 => middle + 1e3 * size * random.in_cube(1.0),
+        3 => middle + 1e7 * size * random.in_cube(1.0),
         4 => b, // on the surface
-        _ => target + size * DVec3::AXES[random.below(3)],
+        _ => target + size * DVec3::AXES[random.index(3)],
     };
     let mut direction = target - origin;
-    match random.below(8) {
-        0 => direction *= 2f64.powi(random.below(600) as i32 - 300),
+    match random.index(8) {
+        0 => direction *= 2f64.powi(random.index(600) as i32 - 300),
         1 => direction = direction.normalize_or(DVec3::X),
-        2 => direction = DVec3::AXES[random.below(3)],
+        2 => direction = DVec3::AXES[random.index(3)],
         _ => {}
     }
-    let within = match random.below(6) {
+    let within = match random.index(6) {
         0 => Interval::LINE,
         1 => Interval::new(-1.0, 2.0),
         2 => Interval::new(0.0, 1.0),
-        3 => Interval::new(0.5, 1.0 + random.unit()),
+        3 => Interval::new(0.5, 1.0 + random.fraction()),
         _ => Interval::FORWARD,
     };
     (Ray::new(origin, direction), within)
 }
 
 /// (rays, hits) compared on every level.
-fn compare(name: &str, (positions, triangles): Parts, rays: usize, random: &mut Random) -> (usize, usize) {
+fn compare(name: &str, (positions, triangles): Parts, rays: usize, random: &mut Rng) -> (usize, usize) {
     let mut mesh = Mesh::new(positions, triangles).unwrap();
     let mut hits = 0;
     for _ in 0..rays {
@@ -82,14 +85,14 @@ fn compare(name: &str, (positions, triangles): Parts, rays: usize, random: &mut 
 
 #[test]
 fn answers_are_those_of_a_loop() {
-    let mut random = Random(1);
+    let mut random = Rng::new(1);
     let (mut rays, mut hits) = (0, 0);
     let mut run = |name: &str, parts: Parts, n: usize| {
         let (r, h) = compare(name, parts, n, &mut random);
         rays += r;
         hits += h;
     };
-    let mut seed = Random(2);
+    let mut seed = Rng::new(2);
     for n in [1, 2, 7, 8, 9, 60, 600] {
         for size in [1e-3, 0.1, 1.0] {
             run("soup", soup(&mut seed, n, size), 400);
@@ -100,7 +103,7 @@ fn answers_are_those_of_a_loop() {
         run("scaled soup", parts, 400);
     }
     for offset in [64.0, 1e4, 1e6, 1e12] {
-        let offset = offset * seed.in_cube();
+        let offset = offset * seed.in_cube(1.0);
         run("far soup", moved(soup(&mut seed, 100, 0.3), 1.0, offset), 400);
         run("far sphere", moved(icosphere(2), 1.0, offset), 400);
     }
@@ -112,15 +115,15 @@ fn answers_are_those_of_a_loop() {
 }
 
 /// Tiles of a camera's rays at a point of the mesh, some exactly at a vertex, a few of them spoiled.
-fn tile(mesh: &Mesh, random: &mut Random) -> Vec<(Ray, Interval)> {
+fn tile(mesh: &Mesh, random: &mut Rng) -> Vec<(Ray, Interval)> {
     let size = mesh.bounds().size().length();
-    let corners = mesh.vertices(random.below(mesh.triangles().len()) as u32);
-    let target = corners[random.below(3)];
-    let eye = mesh.bounds().center() + (0.2 + random.unit()) * size * random.direction();
-    let step = (target - eye).length() * 0.1f64.powi(1 + random.below(4) as i32);
-    let (right, up) = (step * random.direction(), step * random.direction());
-    let spoiled = random.below(6);
-    let to_light = random.below(3) == 0;
+    let corners = mesh.vertices(random.index(mesh.triangles().len()) as u32);
+    let target = corners[random.index(3)];
+    let eye = mesh.bounds().center() + (0.2 + random.fraction()) * size * random.unit();
+    let step = (target - eye).length() * 0.1f64.powi(1 + random.index(4) as i32);
+    let (right, up) = (step * random.unit(), step * random.unit());
+    let spoiled = random.index(6);
+    let to_light = random.index(3) == 0;
     (0..48)
         .map(|i| {
             let (x, y) = (f64::from(i % 4) - 1.0, f64::from(i / 4 % 4) - 1.0);
@@ -141,9 +144,9 @@ fn tile(mesh: &Mesh, random: &mut Random) -> Vec<(Ray, Interval)> {
 
 #[test]
 fn slices_are_answered_as_their_rays_are() {
-    let mut random = Random(21);
+    let mut random = Rng::new(21);
     let (mut rays_in_all, mut hits_in_all) = (0, 0);
-    let meshes = [icosphere(3), torus(30), grid_cube(6), soup(&mut Random(22), 500, 0.2), icosphere(5)];
+    let meshes = [icosphere(3), torus(30), grid_cube(6), soup(&mut Rng::new(22), 500, 0.2), icosphere(5)];
     let far = moved(torus(12), 1e-3, DVec3::new(1e5, 2e5, -3e5));
     for (positions, triangles) in meshes.into_iter().chain([far]) {
         let mut mesh = Mesh::new(positions, triangles).unwrap();
@@ -170,7 +173,7 @@ fn slices_are_answered_as_their_rays_are() {
 
 #[test]
 fn degenerate_meshes_answer_too() {
-    let mut random = Random(3);
+    let mut random = Rng::new(3);
     let ray = Ray::new([0.1, 0.2, 5.0], [0.0, 0.0, -1.0]);
     // Empty.
     let empty = Mesh::new(vec![], vec![]).unwrap();
@@ -180,7 +183,7 @@ fn degenerate_meshes_answer_too() {
     let mut parts = soup(&mut random, 50, 0.5);
     let p = parts.0.clone();
     for i in 0..50u32 {
-        let (a, b) = (p[random.below(150)], p[random.below(150)]);
+        let (a, b) = (p[random.index(150)], p[random.index(150)]);
         let at = parts.0.len() as u32;
         parts.0.extend([a, b, 0.5 * (a + b), a]);
         parts.1.extend([[at, at + 1, at + 2], [at, at, at + 1], [at, at, at], [at, at + 1, at + 3], [i, i, at]]);
@@ -210,17 +213,17 @@ fn degenerate_meshes_answer_too() {
 #[test]
 fn identical_centroids_and_deep_trees_end() {
     // 1e5 triangles around one centre, and a series in which each is a tenth of the one before.
-    let mut random = Random(4);
+    let mut random = Rng::new(4);
     let mut parts = (vec![], vec![]);
     for i in 0..100_000u32 {
-        let (u, v) = (random.in_cube(), random.in_cube());
+        let (u, v) = (random.in_cube(1.0), random.in_cube(1.0));
         parts.0.extend([u, v, -(u + v)]);
         parts.1.push([3 * i, 3 * i + 1, 3 * i + 2]);
     }
     let mesh = Mesh::new(parts.0, parts.1).unwrap();
     let mut hits = 0;
     for _ in 0..20 {
-        let ray = Ray::new(3.0 * random.direction(), random.in_cube());
+        let ray = Ray::new(3.0 * random.unit(), random.in_cube(1.0));
         let expected = brute_force(&mesh, &ray, Interval::LINE);
         hits += usize::from(expected.is_some());
         assert_eq!(mesh.intersect(&ray, Interval::LINE), expected);
@@ -233,8 +236,8 @@ fn identical_centroids_and_deep_trees_end() {
     }
     let mesh = Mesh::new(parts.0, parts.1).unwrap();
     for i in 0..200 {
-        let scale = 2f64.powi(-(random.below(1000) as i32));
-        let origin = scale * DVec3::new(random.unit(), random.unit(), random.unit());
+        let scale = 2f64.powi(-(random.index(1000) as i32));
+        let origin = scale * DVec3::new(random.fraction(), random.fraction(), random.fraction());
         let ray = Ray::new(origin, DVec3::splat(if i % 2 == 0 { 1.0 } else { -1.0 }));
         let expected = brute_force(&mesh, &ray, Interval::FORWARD);
         hits += usize::from(expected.is_some());
@@ -246,13 +249,13 @@ fn identical_centroids_and_deep_trees_end() {
 
 #[test]
 fn boxes_of_images_hold_the_vertices() {
-    let mut random = Random(31);
+    let mut random = Rng::new(31);
     let (mut tightest, mut loosest) = (f64::INFINITY, 0.0f64);
     for offset in [0.0, 1.0, 1e6] {
-        let (positions, triangles) = moved(torus(20), 0.7, offset * random.in_cube());
+        let (positions, triangles) = moved(torus(20), 0.7, offset * random.in_cube(1.0));
         let mesh = Mesh::new(positions, triangles).unwrap();
         for _ in 0..200 {
-            let mut column = || random.in_cube();
+            let mut column = || random.in_cube(1.0);
             let map = glam::DAffine3::from_cols(column(), column(), column(), column());
             let (whole, exact) = (mesh.bounds_under(&map), truehit::Aabb::around_images(mesh.positions(), &map));
             for &p in mesh.positions() {
@@ -267,19 +270,18 @@ fn boxes_of_images_hold_the_vertices() {
     assert!(loosest < 1.8);
 }
 
-/// Rays from inside a closed mesh at its vertices, edges and faces: all must hit. (rays, leaks)
-fn leaks(parts: &Parts, inside: DVec3, rays: usize, random: &mut Random) -> (usize, usize) {
-    let mesh = Mesh::new(parts.0.clone(), parts.1.clone()).unwrap();
+/// How many of `rays` rays from inside a closed mesh at its vertices, edges and faces leave it unseen: all must hit.
+fn leaks(mesh: &Mesh, inside: DVec3, rays: usize, random: &mut Rng) -> usize {
     let mut leaks = 0;
     for i in 0..rays {
-        let [a, b, c] = mesh.vertices(random.below(mesh.triangles().len()) as u32);
+        let [a, b, c] = mesh.vertices(random.index(mesh.triangles().len()) as u32);
         let target = match i % 6 {
             0 => a,
             1 => 0.5 * (a + b),
-            2 => b + random.unit() * (c - b),
+            2 => b + random.fraction() * (c - b),
             3 => 0.5 * (a + 0.5 * (b + c)),
             4 => 0.5 * (c + a),
-            _ => inside + random.direction(),
+            _ => inside + random.unit(),
         };
         let mut direction = target - inside;
         if i % 4 == 3 {
@@ -289,40 +291,58 @@ fn leaks(parts: &Parts, inside: DVec3, rays: usize, random: &mut Random) -> (usi
         let closest = mesh.intersect(&ray, Interval::FORWARD);
         leaks += usize::from(closest.is_none() || !mesh.occludes(&ray, Interval::FORWARD));
     }
-    (rays, leaks)
+    leaks
 }
 
-fn watertight(rays_each: usize) {
-    let mut random = Random(5);
-    let (mut rays, mut leaked) = (0, 0);
+/// `rays` rays and a few more, evenly over closed meshes at offsets to 1e6 times their size.
+fn watertight(rays: usize) {
+    const CHUNK: usize = 10_000;
     let spheres = [
         (icosphere(5), DVec3::ZERO),
         (torus(96), DVec3::X),
         (moved(grid_cube(32), 1.0 / 16.0, DVec3::splat(-1.0)), DVec3::ZERO),
     ];
+    let mut random = Rng::new(5);
+    let mut settings = Vec::new();
     for (parts, inside) in &spheres {
         for distance in [0.0, 1.0, 64.0, 1e3, 1e4, 1e6] {
             let offset = distance * DVec3::new(1.0, -0.7, 0.3);
-            let moved = moved(parts.clone(), 1.0, offset);
-            let inside = *inside + offset + 0.01 * random.in_cube();
-            let (r, l) = leaks(&moved, inside, rays_each, &mut random);
-            rays += r;
-            leaked += l;
+            let (positions, triangles) = moved(parts.clone(), 1.0, offset);
+            settings.push((Mesh::new(positions, triangles).unwrap(), *inside + offset + 0.01 * random.in_cube(1.0)));
         }
     }
-    println!("{rays} aimed rays, {leaked} leaks");
-    assert_eq!(leaked, 0);
+    // All settings side by side, so that what a run has done so far is a fair part of it.
+    let jobs = rays.div_ceil(CHUNK * settings.len()) * settings.len();
+    let (mut finished, mut leaked) = (0, 0);
+    on_all_cores(
+        jobs,
+        |i| {
+            let (mesh, inside) = &settings[i % settings.len()];
+            leaks(mesh, *inside, CHUNK, &mut Rng::new((5 << 40) + i as u64))
+        },
+        |_, found| {
+            finished += 1;
+            leaked += found;
+            if finished % 1000 == 0 {
+                eprintln!("{} of {} aimed rays, {leaked} leaks so far", finished * CHUNK, jobs * CHUNK);
+            }
+        },
+    );
+    println!("{} aimed rays, {leaked} leaks", finished * CHUNK);
+    assert_eq!((finished, leaked), (jobs, 0));
 }
 
 #[test]
 fn closed_meshes_are_watertight() {
-    watertight(60_000);
+    watertight(1_080_000);
 }
 
+/// `cargo test --release --test mesh billion -- --ignored --nocapture`; other numbers of rays by the environment variable
+/// `TRUEHIT_CASES`.
 #[test]
-#[ignore = "a billion rays take half an hour: cargo test --release --test mesh billion -- --ignored --nocapture"]
+#[ignore = "a billion rays take half an hour"]
 fn a_billion_rays_do_not_leak() {
-    watertight(1_000_000_000 / 18 + 1);
+    watertight(support::cases_wanted(1_000_000_000));
 }
 
 /// An axis-parallel grid of rays down on an integer grid mesh: every ray meets a vertex or an edge.
@@ -360,18 +380,18 @@ fn t_junction(middle: DVec3, a: DVec3, b: DVec3) -> Mesh {
 
 #[test]
 fn t_junctions_crack_only_where_they_really_do() {
-    let mut random = Random(6);
+    let mut random = Rng::new(6);
     let (mut met, mut cracked, mut through) = (0, 0, 0);
     for _ in 0..2000 {
         // 20-bit coordinates: the middle is a float. Then a third of the way, which is not.
         let coarse = |v: DVec3| (v * 1_048_576.0).round() / 1_048_576.0;
-        let (a, b) = (coarse(random.in_cube()), coarse(random.in_cube()));
+        let (a, b) = (coarse(random.in_cube(1.0)), coarse(random.in_cube(1.0)));
         let whole = t_junction(0.5 * (a + b), a, b);
         let third = a + (b - a) / 3.0;
         let torn = t_junction(third, a, b);
         for i in 0..32 {
             let target = a + f64::from(i + 1) / 32.0 * (b - a);
-            let d = coarse(random.in_cube()) * 8.0;
+            let d = coarse(random.in_cube(1.0)) * 8.0;
             // Exactly at the edge: every term is a short dyadic.
             let ray = Ray::new(target - d, d);
             met += usize::from(whole.intersect(&ray, Interval::FORWARD).is_some());
@@ -390,18 +410,18 @@ fn t_junctions_crack_only_where_they_really_do() {
 /// miss, as they should, and no others do.
 #[test]
 fn a_torn_t_junctions_gap_is_seen() {
-    let mut random = Random(8);
+    let mut random = Rng::new(8);
     let side = |p: DVec3, a: DVec3, b: DVec3, d: DVec3| (b - a).cross(p - a).dot(d);
     let (mut rays, mut through) = ([0; 2], [0; 2]);
     for _ in 0..400 {
         let coarse = |v: DVec3| (v * 1_048_576.0).round() / 1_048_576.0;
-        let (a, b) = (coarse(random.in_cube()), coarse(random.in_cube()));
+        let (a, b) = (coarse(random.in_cube(1.0)), coarse(random.in_cube(1.0)));
         let middles = [0.5 * (a + b), a + (b - a) / 3.0];
         for (torn, middle) in middles.into_iter().enumerate() {
             let mesh = t_junction(middle, a, b);
             for _ in 0..50 {
                 // From so near that the directions tell points inside the gap apart; not along the surface.
-                let d = 1e-3 * random.direction();
+                let d = 1e-3 * random.unit();
                 if side(a + b + DVec3::new(0.3, 0.2, 1.0), a, b, d) * side(a - b - DVec3::new(0.3, 0.2, 1.0), a, b, d)
                     >= 0.0
                 {
@@ -502,7 +522,7 @@ fn bad_meshes_are_refused_by_name() {
 #[test]
 #[cfg(feature = "rayon")]
 fn threads_do_not_change_the_tree() {
-    let (positions, triangles) = soup(&mut Random(8), 20_000, 0.05);
+    let (positions, triangles) = soup(&mut Rng::new(8), 20_000, 0.05);
     let build = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| format!("{:?}", Mesh::new(positions.clone(), triangles.clone()).unwrap()))

@@ -18,6 +18,7 @@ mod watertight;
 use kernels::{Entry, Function, Origin};
 use rows::{Accuracy, Sheet};
 use support::cases::Kernel;
+use support::rng;
 use truehit::glam::{DVec2, DVec3};
 use truehit::kernel::{frustum, sphere, triangle};
 use truehit::{Hit, Interval, Ray};

@@ -2,12 +2,11 @@
 
 mod support;
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use support::cases::{Case, Kernel, Solid};
 use support::families;
 use support::rng::Rng;
 use support::shapes::shape;
+use support::sweep::on_all_cores;
 use truehit::glam::{DAffine3, DMat3, DQuat, DVec3};
 use truehit::{Affine, Hit, Interval, Plane, Ray, Shape, Surface};
 
@@ -188,35 +187,31 @@ impl Tally {
 fn sweep(rays: usize) {
     const CHUNK: usize = 1000;
     let jobs: Vec<(Place, Kernel)> = PLACES.iter().flat_map(|&p| KERNELS.map(|k| (p, k))).collect();
-    let tallies = Mutex::new(vec![Tally::default(); jobs.len()]);
-    let (next, chunks) = (AtomicUsize::new(0), rays.div_ceil(CHUNK));
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(|| {
-                loop {
-                    let n = next.fetch_add(1, Ordering::Relaxed);
-                    // All shapes and places side by side, so that what a run has done so far is a fair part of it.
-                    let (job, chunk) = (n % jobs.len(), n / jobs.len());
-                    if chunk >= chunks {
-                        break;
-                    }
-                    let (place, kernel) = jobs[job];
-                    let mut tally = Tally::default();
-                    for i in chunk * CHUNK..((chunk + 1) * CHUNK).min(rays) {
-                        tally.spawn(place, kernel, &mut Rng::new(((job as u64) << 40) + i as u64), i);
-                    }
-                    let mut tallies = tallies.lock().unwrap();
-                    tallies[job].merge(tally);
-                    if n % 2000 == 1999 {
-                        let mut total = Tally::default();
-                        tallies.iter().for_each(|t| total.merge(t.clone()));
-                        eprintln!("so far: {}", total.counts());
-                    }
+    let mut tallies = vec![Tally::default(); jobs.len()];
+    let mut finished = 0;
+    // All shapes and places side by side, so that what a run has done so far is a fair part of it.
+    on_all_cores(
+        jobs.len() * rays.div_ceil(CHUNK),
+        |n| {
+            let (job, first) = (n % jobs.len(), n / jobs.len() * CHUNK);
+            let mut tally = Tally::default();
+            for i in first..(first + CHUNK).min(rays) {
+                tally.spawn(jobs[job].0, jobs[job].1, &mut Rng::new(((job as u64) << 40) + i as u64), i);
+            }
+            tally
+        },
+        |n, tally| {
+            tallies[n % jobs.len()].merge(tally);
+            finished += 1;
+            if finished % 2000 == 0 {
+                let mut total = Tally::default();
+                for t in &tallies {
+                    total.merge(t.clone());
                 }
-            });
-        }
-    });
-    let tallies = tallies.into_inner().unwrap();
+                eprintln!("so far: {}", total.counts());
+            }
+        },
+    );
     let mut total = Tally::default();
     for ((place, kernel), t) in jobs.iter().zip(&tallies) {
         println!(

@@ -27,6 +27,7 @@ use kernels::Origin;
 use rows::{Accuracy, Row, Sheet};
 use std::path::PathBuf;
 use support::cases::Kernel;
+use support::rng;
 
 const USAGE: &str = "speed_vs_error [--full] [--cases N] [--rounds N] [--kernel NAME] [--out DIR]
   --full         20000 cases a family instead of 500, and finer plots

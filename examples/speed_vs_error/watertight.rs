@@ -1,8 +1,9 @@
 //! Closed convex meshes from inside: every ray must hit, leave once, and meet first what exact arithmetic meets first.
 
-use crate::meshes::{Parts, Random, grid_cube, icosphere, moved};
+use crate::meshes::{Parts, grid_cube, icosphere, moved};
 use crate::support::big::Real;
 use crate::support::oracle::{self, Line};
+use crate::support::rng::Rng;
 use truehit::glam::DVec3;
 use truehit::kernel::{textbook, triangle};
 use truehit::{Hit, Interval, Mesh, Ray, Shape};
@@ -50,7 +51,7 @@ type Triangle = fn(&Ray, &[DVec3; 3], Interval) -> Option<Hit>;
 /// Unit spheres here and far away, a small one farther, and a cube of integers; `n` rays a mesh and aim.
 pub fn settings(n: usize) -> Vec<Setting> {
     let far = DVec3::new(148_376.0, 1234.0, -223_423.0);
-    let mut random = Random(41);
+    let mut random = Rng::new(41);
     [
         (icosphere(2), DVec3::ZERO, 0.1),
         (moved(icosphere(2), 1.0, far), far, 0.1),
@@ -61,19 +62,19 @@ pub fn settings(n: usize) -> Vec<Setting> {
     .into()
 }
 
-fn setting((positions, triangles): Parts, inside: DVec3, spread: f64, n: usize, random: &mut Random) -> Setting {
+fn setting((positions, triangles): Parts, inside: DVec3, spread: f64, n: usize, random: &mut Rng) -> Setting {
     let corners: Vec<[DVec3; 3]> = triangles.iter().map(|t| t.map(|i| positions[i as usize])).collect();
     let (mut rays, mut aims, mut first) = (Vec::new(), Vec::new(), Vec::new());
     for aim in 0..AIMS.len() {
         for i in 0..n {
-            let [a, b, c] = corners[random.below(corners.len())];
+            let [a, b, c] = corners[random.index(corners.len())];
             let target = match aim {
                 0 => a,
                 1 if i % 2 == 0 => 0.5 * (a + b),
-                1 => a + random.unit() * (b - a),
-                _ => a + 0.25 * (1.0 + random.unit()) * (b - a) + 0.4 * random.unit() * (c - a),
+                1 => a + random.fraction() * (b - a),
+                _ => a + 0.25 * (1.0 + random.fraction()) * (b - a) + 0.4 * random.fraction() * (c - a),
             };
-            let origin = inside + spread * random.in_cube();
+            let origin = inside + spread * random.in_cube(1.0);
             let direction = if i % 3 == 0 { (target - origin).normalize() } else { target - origin };
             let ray = Ray::new(origin, direction);
             rays.push((ray, Interval::FORWARD));

@@ -5,26 +5,16 @@ use super::collapse::{Built, build};
 use super::watch::Watch;
 use super::wide::{LEAF, NONE};
 use crate::Aabb;
+use crate::kernel::search::Random;
 use glam::DVec3;
 
 type Parts = (Vec<DVec3>, Vec<[u32; 3]>);
 
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn direction(&mut self) -> DVec3 {
-        let z = 2.0 * self.unit() - 1.0;
-        let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
-        let r = (1.0 - z * z).sqrt();
-        DVec3::new(r * cos, r * sin, z)
-    }
+fn direction(random: &mut Random) -> DVec3 {
+    let z = random.number();
+    let (sin, cos) = (std::f64::consts::PI * random.number()).sin_cos();
+    let r = (1.0 - z * z).sqrt();
+    DVec3::new(r * cos, r * sin, z)
 }
 
 #[derive(Default, Clone, Copy)]
@@ -67,11 +57,19 @@ impl Traced<'_> {
         (1.0 + inner / root, leaves / root)
     }
 
-    fn trace(&self, origin: DVec3, direction: DVec3, t_max: f64, any: bool, visits: &mut Visits) -> Option<(f64, u32)> {
+    /// The nearest triangle, or any, but not `left`, which the ray starts on.
+    fn trace(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        left: Option<u32>,
+        any: bool,
+        visits: &mut Visits,
+    ) -> Option<(f64, u32)> {
         let frame = &self.built.tree.frame;
         let (o, d) = (frame.local(origin), direction * frame.scale);
         let mut best: Option<(f64, u32)> = None;
-        let mut limit = t_max;
+        let mut limit = f64::INFINITY;
         let mut stack = vec![(0u32, 0.0)];
         while let Some((at, t)) = stack.pop() {
             if t > limit {
@@ -88,7 +86,7 @@ impl Traced<'_> {
                     let q = s.cross(e1);
                     let det = e1.dot(p);
                     let (u, v, t) = (s.dot(p) / det, direction.dot(q) / det, e2.dot(q) / det);
-                    if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t < limit {
+                    if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t < limit && left != Some(object) {
                         limit = t;
                         best = Some((t, object));
                         if any {
@@ -114,7 +112,7 @@ impl Traced<'_> {
                     near = near.max(x.min(y));
                     far = far.min(x.max(y));
                 }
-                if near <= far * (1.0 + 1e-7) {
+                if near <= far {
                     met.push((c, near));
                 }
             }
@@ -157,7 +155,7 @@ fn report(name: &str, parts: &Parts, rays: usize) {
     let bounds = Aabb::around(&parts.0);
     let (center, radius) = (bounds.center(), 0.5 * bounds.size().length());
     let interior = ["sponza", "kitchen"].iter().any(|s| name.contains(s));
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let mut sets = [Visits::default(); 5];
     let mut points = Vec::new();
     let side = (rays as f64 / 4.0).sqrt() as usize;
@@ -177,25 +175,25 @@ fn report(name: &str, parts: &Parts, rays: usize) {
         for i in 0..side * side {
             let at = |p: usize| half * (2.0 * (p as f64 + 0.5) / side as f64 - 1.0);
             let d = forward + at(i % side) * right + at(i / side) * up;
-            if let Some((t, object)) = traced.trace(eye, d, f64::INFINITY, false, &mut sets[0]) {
+            if let Some((t, object)) = traced.trace(eye, d, None, false, &mut sets[0]) {
                 let [a, b, c] = corners(object as usize);
                 let normal = (b - a).cross(c - a).normalize();
                 let normal = if normal.dot(d) > 0.0 { -normal } else { normal };
                 if normal.is_finite() {
-                    points.push((eye + t * d + 1e-5 * radius * normal, normal));
+                    points.push((eye + t * d, normal, object));
                 }
             }
         }
     }
     for i in 0..count {
-        let (p, normal) = points[i * points.len() / count];
-        let d = normal + random.direction();
-        traced.trace(p, d, f64::INFINITY, false, &mut sets[1]);
-        traced.trace(p, d, f64::INFINITY, true, &mut sets[3]);
-        let at = center + 1.1 * (DVec3::new(random.unit(), random.unit(), random.unit()) - 0.5) * bounds.size();
-        let d = random.direction();
-        traced.trace(at, d, f64::INFINITY, false, &mut sets[2]);
-        traced.trace(at, d, f64::INFINITY, true, &mut sets[4]);
+        let (p, normal, object) = points[i * points.len() / count];
+        let d = normal + direction(&mut random);
+        traced.trace(p, d, Some(object), false, &mut sets[1]);
+        traced.trace(p, d, Some(object), true, &mut sets[3]);
+        let at = center + 0.55 * DVec3::new(random.number(), random.number(), random.number()) * bounds.size();
+        let d = direction(&mut random);
+        traced.trace(at, d, None, false, &mut sets[2]);
+        traced.trace(at, d, None, true, &mut sets[4]);
     }
     print!(
         "{name:<16} {bytes:5.1} bytes a triangle, fill {:4.2} | SAH {inner:5.2} + {leaves:5.2}",

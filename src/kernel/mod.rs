@@ -17,7 +17,7 @@ pub mod polygon;
 pub mod ratio;
 pub mod scaled;
 #[cfg(test)]
-mod search;
+pub(crate) mod search;
 mod section;
 pub mod slab;
 pub mod sphere;

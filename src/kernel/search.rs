@@ -25,9 +25,14 @@ pub(super) fn cross3(a: &[Rational; 3], b: &[Rational; 3]) -> [Rational; 3] {
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
-struct Random(u64);
+/// SplitMix64.
+pub(crate) struct Random(u64);
 
 impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -36,7 +41,7 @@ impl Random {
     }
 
     /// (−1, 1)
-    fn number(&mut self) -> f64 {
+    pub(crate) fn number(&mut self) -> f64 {
         (self.next() >> 11) as f64 / 4_503_599_627_370_496.0 - 1.0
     }
 
@@ -47,7 +52,7 @@ impl Random {
 
 /// `visit` with `n` random points of (−1, 1)^dimension.
 pub(super) fn each(n: usize, dimension: usize, mut visit: impl FnMut(&[f64])) {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     for _ in 0..n {
         visit(&random.numbers(dimension));
     }
@@ -55,7 +60,7 @@ pub(super) fn each(n: usize, dimension: usize, mut visit: impl FnMut(&[f64])) {
 
 /// The largest `ratio` found: random starts, then steps of every size from the best of them, uphill.
 pub(super) fn climb(name: &str, dimension: usize, ratio: impl Fn(&[f64]) -> Option<f64>) -> f64 {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let (mut best, mut tried) = (0.0, 0);
     for _ in 0..12 {
         let starts = (0..250).map(|_| random.numbers(dimension)).filter_map(|x| ratio(&x).map(|r| (r, x)));

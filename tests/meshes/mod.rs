@@ -1,51 +1,12 @@
-//! Meshes and random numbers for the tests of trees and meshes.
+//! Meshes for the tests of trees and meshes. Whoever includes this has `rng` of `tests/support` beside it.
 #![allow(dead_code, unreachable_pub, reason = "each test uses some")]
 
+use super::rng::Rng;
 use glam::DVec3;
 use std::collections::HashMap;
 use truehit::glam;
 
 pub type Parts = (Vec<DVec3>, Vec<[u32; 3]>);
-
-/// Splitmix64: small, seedable, good enough.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// In [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// In [−1, 1).
-    pub fn signed(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
-    }
-
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
-
-    pub fn in_cube(&mut self) -> DVec3 {
-        DVec3::new(self.signed(), self.signed(), self.signed())
-    }
-
-    pub fn direction(&mut self) -> DVec3 {
-        loop {
-            let v = self.in_cube();
-            let l = v.length_squared();
-            if l > 0.01 && l < 1.0 {
-                return v / l.sqrt();
-            }
-        }
-    }
-}
 
 /// A sphere of radius about 1: an icosahedron whose triangles are quartered `times` times.
 pub fn icosphere(times: u32) -> Parts {
@@ -157,13 +118,13 @@ pub fn grid_cube(n: u32) -> Parts {
 }
 
 /// Unconnected triangles of sizes from `size`·1e-3 to `size` in the unit cube.
-pub fn soup(random: &mut Random, n: usize, size: f64) -> Parts {
+pub fn soup(random: &mut Rng, n: usize, size: f64) -> Parts {
     let mut positions = Vec::new();
     for _ in 0..n {
-        let at = random.in_cube();
-        let size = size * 10f64.powf(-3.0 * random.unit());
+        let at = random.in_cube(1.0);
+        let size = size * 10f64.powf(-3.0 * random.fraction());
         for _ in 0..3 {
-            positions.push(at + size * random.in_cube());
+            positions.push(at + size * random.in_cube(1.0));
         }
     }
     (positions, (0..n as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())

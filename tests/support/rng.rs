@@ -1,4 +1,5 @@
 //! Seeded random numbers (`SplitMix64`, Steele et al. 2014): the same cases on every machine.
+#![allow(dead_code, unreachable_pub, reason = "each test uses some")]
 
 use truehit::glam::DVec3;
 
@@ -18,9 +19,19 @@ impl Rng {
         z ^ (z >> 31)
     }
 
+    /// A stream of its own for each name.
+    pub fn named(name: &str) -> Self {
+        Self(name.bytes().fold(7, |h, b| h * 31 % 1_000_003 + u64::from(b)))
+    }
+
     /// [0, n)
     pub fn below(&mut self, n: u64) -> u64 {
         self.next() % n
+    }
+
+    /// [0, n), to index with.
+    pub fn index(&mut self, n: usize) -> usize {
+        self.below(n as u64) as usize
     }
 
     /// lo..=hi
@@ -29,7 +40,7 @@ impl Rng {
     }
 
     pub fn pick<T: Copy>(&mut self, from: &[T]) -> T {
-        from[self.below(from.len() as u64) as usize]
+        from[self.index(from.len())]
     }
 
     pub fn chance(&mut self, p: f64) -> bool {
@@ -42,6 +53,26 @@ impl Rng {
 
     pub fn uniform(&mut self, lo: f64, hi: f64) -> f64 {
         lo + (hi - lo) * ((self.next() >> 11) as f64 / 9_007_199_254_740_992.0)
+    }
+
+    /// [0, 1)
+    pub fn fraction(&mut self) -> f64 {
+        self.uniform(0.0, 1.0)
+    }
+
+    /// 10^uniform(lo, hi): as far as subnormals.
+    pub fn decades(&mut self, lo: f64, hi: f64) -> f64 {
+        10f64.powf(self.uniform(lo, hi))
+    }
+
+    /// A whole number of magnitude at most `n`.
+    pub fn whole(&mut self, n: i64) -> f64 {
+        self.integer(-n, n) as f64
+    }
+
+    /// A point of the integer grid.
+    pub fn grid(&mut self, n: i64) -> DVec3 {
+        DVec3::new(self.whole(n), self.whole(n), self.whole(n))
     }
 
     /// Log-uniform; both limits above zero.

@@ -5,17 +5,39 @@ use super::cases::{Case, Family, Kernel, Solid};
 use super::measure::{measure, scale};
 use super::oracle::{Line, Truth, innermost, solid, truth};
 use super::shapes::{as_stored, object_ray, shape};
+use std::ops::AddAssign;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use truehit::bvh::Level;
 use truehit::glam::{DVec2, DVec3};
 use truehit::kernel::{frustum, plane, polygon, slab, sphere, textbook, triangle};
 use truehit::{Hit, Mesh, Shape};
 
+/// `job` of 0..`jobs` on all cores, taken up in that order; `done` is told each result, one at a time.
+pub fn on_all_cores<T: Send>(jobs: usize, job: impl Fn(usize) -> T + Sync, done: impl FnMut(usize, T) + Send) {
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(done));
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                loop {
+                    let i = next.fetch_add(1, Ordering::Relaxed);
+                    if i >= jobs {
+                        break;
+                    }
+                    let result = job(i);
+                    done.lock().expect("no other thread has panicked")(i, result);
+                }
+            });
+        }
+    });
+}
+
 /// What a kernel answers to a case; `None` for shapes it does not know.
 pub type Answer = fn(&Case) -> Option<Hit>;
 
-/// What came out.
-#[derive(Clone, Debug, Default)]
-pub struct Row {
+/// What was counted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Counts {
     pub cases: usize,
     /// By the exact truth.
     pub hits: usize,
@@ -27,66 +49,18 @@ pub struct Row {
     pub wrong_parts: usize,
     /// Bounds that do not hold.
     pub violations: usize,
-    /// Of each right hit.
-    pub ulps: Vec<f32>,
-    /// bound / error of each right hit whose λ is not exact.
-    pub tightness: Vec<f32>,
-    /// The largest error in ulps, and the case.
-    pub worst: Option<(f64, Case)>,
-    /// The first cases of a wrong decision, a wrong part, a violated bound.
-    pub failures: Vec<(&'static str, Case)>,
+    /// The largest error in ulps.
+    pub max_ulps: f64,
 }
 
-impl Row {
+impl Counts {
     pub fn wrong(&self) -> usize {
         self.false_hits + self.false_misses
     }
+}
 
-    pub fn add(&mut self, case: &Case, answer: Option<Hit>) {
-        let truth = truth(case);
-        self.cases += 1;
-        self.hits += usize::from(truth.is_some());
-        let failed = |row: &mut Self, what| {
-            if row.failures.len() < 10 {
-                row.failures.push((what, case.clone()));
-            }
-        };
-        if matches!(case.solid, Solid::Affine { .. }) && is_borderline(case, truth.as_ref(), answer.as_ref()) {
-            self.borderline += 1;
-            return;
-        }
-        match (truth, answer) {
-            (None, None) => {}
-            (None, Some(_)) => {
-                self.false_hits += 1;
-                failed(self, "false hit");
-            }
-            (Some(_), None) => {
-                self.false_misses += 1;
-                failed(self, "false miss");
-            }
-            (Some(truth), Some(hit)) => {
-                if !truth.parts.contains(&hit.part) {
-                    self.wrong_parts += 1;
-                    failed(self, "wrong part");
-                }
-                let m = measure(&hit, &truth.lambda.enclosure(), scale(case));
-                if m.violated {
-                    self.violations += 1;
-                    failed(self, "bound violated");
-                }
-                self.ulps.push(m.ulps as f32);
-                if m.tightness.is_finite() {
-                    self.tightness.push(m.tightness as f32);
-                }
-                if self.worst.as_ref().is_none_or(|w| m.ulps > w.0) {
-                    self.worst = Some((m.ulps, case.clone()));
-                }
-            }
-        }
-    }
-
-    pub fn merge(&mut self, other: Self) {
+impl AddAssign for Counts {
+    fn add_assign(&mut self, other: Self) {
         self.cases += other.cases;
         self.hits += other.hits;
         self.false_hits += other.false_hits;
@@ -94,19 +68,80 @@ impl Row {
         self.borderline += other.borderline;
         self.wrong_parts += other.wrong_parts;
         self.violations += other.violations;
+        // A NaN is kept.
+        self.max_ulps = if other.max_ulps <= self.max_ulps { self.max_ulps } else { other.max_ulps };
+    }
+}
+
+/// What came out.
+#[derive(Clone, Debug, Default)]
+pub struct Row {
+    pub counts: Counts,
+    /// Of each right hit.
+    pub ulps: Vec<f32>,
+    /// bound / error of each right hit whose λ is not exact.
+    pub tightness: Vec<f32>,
+    /// The case of the largest error in ulps.
+    pub worst: Option<Case>,
+    /// The first cases of a wrong decision, a wrong part, a violated bound.
+    pub failures: Vec<(&'static str, Case)>,
+}
+
+impl Row {
+    pub fn add(&mut self, case: &Case, answer: Option<Hit>) {
+        let truth = truth(case);
+        self.counts.cases += 1;
+        self.counts.hits += usize::from(truth.is_some());
+        let failed = |row: &mut Self, what| {
+            if row.failures.len() < 10 {
+                row.failures.push((what, case.clone()));
+            }
+        };
+        if matches!(case.solid, Solid::Affine { .. }) && is_borderline(case, truth.as_ref(), answer.as_ref()) {
+            self.counts.borderline += 1;
+            return;
+        }
+        match (truth, answer) {
+            (None, None) => {}
+            (None, Some(_)) => {
+                self.counts.false_hits += 1;
+                failed(self, "false hit");
+            }
+            (Some(_), None) => {
+                self.counts.false_misses += 1;
+                failed(self, "false miss");
+            }
+            (Some(truth), Some(hit)) => {
+                if !truth.parts.contains(&hit.part) {
+                    self.counts.wrong_parts += 1;
+                    failed(self, "wrong part");
+                }
+                let m = measure(&hit, &truth.lambda.enclosure(), scale(case));
+                if m.violated {
+                    self.counts.violations += 1;
+                    failed(self, "bound violated");
+                }
+                self.ulps.push(m.ulps as f32);
+                if m.tightness.is_finite() {
+                    self.tightness.push(m.tightness as f32);
+                }
+                if self.worst.is_none() || m.ulps > self.counts.max_ulps {
+                    self.counts.max_ulps = m.ulps;
+                    self.worst = Some(case.clone());
+                }
+            }
+        }
+    }
+
+    pub fn merge(&mut self, other: Self) {
+        if self.worst.is_none() || other.counts.max_ulps > self.counts.max_ulps {
+            self.worst = other.worst.or(self.worst.take());
+        }
+        self.counts += other.counts;
         self.ulps.extend(other.ulps);
         self.tightness.extend(other.tightness);
         self.failures.extend(other.failures);
         self.failures.truncate(10);
-        if let Some(w) = other.worst
-            && self.worst.as_ref().is_none_or(|s| w.0 > s.0)
-        {
-            self.worst = Some(w);
-        }
-    }
-
-    pub fn max_ulps(&self) -> f64 {
-        self.worst.as_ref().map_or(0.0, |w| w.0)
     }
 }
 
