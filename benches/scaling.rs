@@ -1,5 +1,6 @@
 //! How cost grows: meshes of 10⁴ to 10⁷ triangles, scenes of 10³ to 10⁶ instances. Prints tables, no statistics:
 //! `cargo bench --bench scaling [-- LARGEST]`, the largest number of triangles, 10⁶ unless told; a tenth of it of instances.
+//! `-- instances LARGEST` for the largest number of instances, and no meshes.
 
 #[path = "../tests/meshes/mod.rs"]
 mod meshes;
@@ -112,14 +113,18 @@ fn instances(n: usize) {
 
 fn main() {
     let largest = std::env::args().skip(1).find_map(|a| a.parse::<f64>().ok()).unwrap_or(1e6) as usize;
-    println!(
-        "| triangles | build, one thread (M/s) | build (M/s) | bytes a triangle | Mray/s |\n|---|---|---|---|---|"
-    );
-    for n in [10_000, 100_000, 1_000_000, 10_000_000].into_iter().filter(|&n| n <= largest) {
-        mesh(terrain(n));
+    let only_instances = std::env::args().any(|a| a == "instances");
+    if !only_instances {
+        println!(
+            "| triangles | build, one thread (M/s) | build (M/s) | bytes a triangle | Mray/s |\n|---|---|---|---|---|"
+        );
+        for n in [10_000, 100_000, 1_000_000, 10_000_000].into_iter().filter(|&n| n <= largest) {
+            mesh(terrain(n));
+        }
     }
+    let largest = if only_instances { largest } else { largest / 10 };
     println!("\n| instances | placing | scene | bytes an instance | Mray/s |\n|---|---|---|---|---|");
-    for n in [1000, 10_000, 100_000, 1_000_000].into_iter().filter(|&n| n <= largest / 10) {
+    for n in [1000, 10_000, 100_000, 1_000_000].into_iter().filter(|&n| n <= largest) {
         instances(n);
     }
 }

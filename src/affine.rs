@@ -31,17 +31,14 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 /// assert_eq!(hit.lambda, 3.0);
 /// # Ok::<(), truehit::InvalidShape>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Affine<S> {
     shape: S,
-    object_from_world: DAffine3,
-    world_from_object: DAffine3,
     /// To the frame of the innermost shape, which is `shape` unless that is itself seen through a map.
     innermost_from_world: Map,
     world_from_innermost: DAffine3,
-    bounds: Aabb,
-    /// At least ‖M‖, M = `innermost_from_world`, and ‖M⁻¹‖: by how much they may lengthen a vector.
-    norms: [f64; 2],
+    /// Of a chain, which few are: `object_from_world` and its inverse.
+    link: Option<Box<[DAffine3; 2]>>,
 }
 
 impl<S: Shape> Affine<S> {
@@ -58,24 +55,15 @@ impl<S: Shape> Affine<S> {
         let object_from_world = inverse(&world_from_object).map_err(refused)?;
         // What the shape is defined by, inverted: not quite the map that was given.
         let world_from_object = inverse(&object_from_world).map_err(refused)?;
-        let (innermost_from_world, world_from_innermost, bounds) = match shape.seen_through() {
-            Some((innermost, map)) => {
+        let (innermost_from_world, world_from_innermost, link) = match shape.seen_through() {
+            Some((_, map)) => {
                 let map = map.after(&object_from_world).map_err(refused)?;
                 let inverse = map.inverse().map_err(refused)?;
-                (map, inverse, innermost.bounds_under(&inverse))
+                (map, inverse, Some(Box::new([object_from_world, world_from_object])))
             }
-            None => (object_from_world.into(), world_from_object, shape.bounds_under(&world_from_object)),
+            None => (object_from_world.into(), world_from_object, None),
         };
-        let norms = [innermost_from_world.leading(), &world_from_innermost].map(|m| largest_stretch(&m.matrix3));
-        Ok(Self {
-            shape,
-            object_from_world,
-            world_from_object,
-            innermost_from_world,
-            world_from_innermost,
-            bounds,
-            norms,
-        })
+        Ok(Self { shape, innermost_from_world, world_from_innermost, link })
     }
 
     /// The ray that hit or miss is decided for, in the frame of the innermost shape: that of [`shape`](Self::shape), or
@@ -99,13 +87,13 @@ impl<S> Affine<S> {
     /// The map that defines the shape: the inverse of the one given, each entry rounded once.
     #[must_use]
     pub fn object_from_world(&self) -> &DAffine3 {
-        &self.object_from_world
+        self.link.as_ref().map_or(self.innermost_from_world.leading(), |link| &link[0])
     }
 
     /// The inverse of [`object_from_world`](Self::object_from_world), each entry rounded once.
     #[must_use]
     pub fn world_from_object(&self) -> &DAffine3 {
-        &self.world_from_object
+        self.link.as_ref().map_or(&self.world_from_innermost, |link| &link[1])
     }
 }
 
@@ -150,6 +138,11 @@ impl<S: Shape> Affine<S> {
 
     fn image(&self, world_ray: &Ray) -> Image {
         self.innermost_from_world.image(world_ray)
+    }
+
+    /// At least ‖M‖: by how much M may lengthen a vector.
+    fn norm(&self) -> f64 {
+        largest_stretch(&self.innermost_from_world.leading().matrix3)
     }
 
     /// Mᵀn.
@@ -298,7 +291,7 @@ impl<S: Shape> Shape for Affine<S> {
     }
 
     fn bounds(&self) -> Aabb {
-        self.bounds
+        self.innermost().bounds_under(&self.world_from_innermost)
     }
 
     fn seen_through(&self) -> Option<(&dyn Shape, &Map)> {
@@ -324,7 +317,7 @@ impl<S: Shape> Shape for Affine<S> {
             w.x_axis.abs() * position.x.abs() + w.y_axis.abs() * position.y.abs() + w.z_axis.abs() * position.z.abs();
         let rounding = U * (taxicab(world) + 2.0 * taxicab(size + t.abs()));
         // An object-space error ε is at most ‖W‖ε here; along the normal, where it lies, it is ε/|Mᵀn|.
-        let stretched = error * self.norms[1];
+        let stretched = error * largest_stretch(&self.world_from_innermost.matrix3);
         let across = 1.01 * error / self.across(self.innermost().normal(&object_ray, hit)).length();
         let bends = self.curvature(world_ray, hit) * across;
         let off = if bends < 0.005 && across < stretched { across } else { stretched };
@@ -350,9 +343,14 @@ impl<S: Shape> Shape for Affine<S> {
 
     fn curvature(&self, world_ray: &Ray, hit: &Hit) -> f64 {
         let object_ray = self.object_ray(world_ray);
+        let curvature = self.innermost().curvature(&object_ray, hit);
+        if curvature == 0.0 {
+            return 0.0;
+        }
         let across = self.across(self.innermost().normal(&object_ray, hit)).length();
         // κ‖M‖²/|Mᵀn|, in an order that stays in range.
-        self.innermost().curvature(&object_ray, hit) * self.norms[0] * (self.norms[0] / across)
+        let norm = self.norm();
+        curvature * norm * (norm / across)
     }
 
     fn normal_error(&self, world_ray: &Ray, hit: &Hit) -> f64 {
@@ -360,7 +358,7 @@ impl<S: Shape> Shape for Affine<S> {
         let across = self.across(self.innermost().normal(&object_ray, hit)).length();
         // |δ(Mᵀn)| ≤ ‖M‖(|δn| + a few u); of it only what is across Mᵀn turns the unit vector.
         let error = self.innermost().normal_error(&object_ray, hit) + 8.0 * U;
-        1.01 * error * (self.norms[0] / across) + 8.0 * U
+        1.01 * error * (self.norm() / across) + 8.0 * U
     }
 
     fn precise_lambda(&self, world_ray: &Ray, hit: &Hit) -> [f64; 2] {

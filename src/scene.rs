@@ -1,6 +1,6 @@
 //! Many shapes, one question: what does the ray meet first?
 
-use crate::bvh::Bvh;
+use crate::bvh::{self, Bvh};
 use crate::kernel::eft::two_diff;
 use crate::{Aabb, Hit, Interval, Ray, Shape, Surface};
 
@@ -25,8 +25,7 @@ use crate::{Aabb, Hit, Interval, Ray, Shape, Surface};
 #[derive(Debug)]
 pub struct Scene<M> {
     objects: Vec<Object<M>>,
-    /// Objects with a finite box; the tree's objects are places in this list.
-    bounded: Vec<usize>,
+    /// Of the objects with a finite box.
     tree: Bvh,
     /// The others, asked by every ray: planes, and shapes whose box has an infinity or a NaN in it.
     unbounded: Vec<usize>,
@@ -71,20 +70,26 @@ impl<M> SceneBuilder<M> {
     /// its box is asked by every ray, like an unbounded one.
     #[must_use]
     pub fn build(self) -> Scene<M> {
-        let (mut bounded, mut unbounded) = (Vec::new(), Vec::new());
+        let shapes: Vec<&dyn Shape> = self.objects.iter().map(|object| &*object.shape).collect();
+        let mut boxes = bvh::map(shapes.len(), |i| shapes[i].bounds());
+        drop(shapes);
+        let mut unbounded = Vec::new();
         let mut bounds = Aabb::EMPTY;
-        for (index, object) in self.objects.iter().enumerate() {
-            let own = object.shape.bounds();
+        for (index, own) in boxes.iter_mut().enumerate() {
             if own.min.is_nan() || own.max.is_nan() {
                 bounds = Aabb::EVERYTHING;
             } else {
-                bounds = bounds.union(own);
+                bounds = bounds.union(*own);
             }
-            let list = if own.is_finite() && !own.is_empty() { &mut bounded } else { &mut unbounded };
-            list.push(index);
+            if !own.is_finite() || own.is_empty() {
+                unbounded.push(index);
+                // Not in the tree.
+                *own = Aabb::EMPTY;
+            }
         }
-        let boxes: Vec<Aabb> = bounded.iter().map(|&index| self.objects[index].shape.bounds()).collect();
-        Scene { objects: self.objects, bounded, tree: Bvh::build(&boxes), unbounded, bounds }
+        let mut objects = self.objects;
+        objects.shrink_to_fit();
+        Scene { objects, tree: Bvh::build(&boxes), unbounded, bounds }
     }
 }
 
@@ -107,7 +112,7 @@ impl<M> Scene<M> {
         }
         let limit = |nearest: &Option<SceneHit>| nearest.as_ref().map_or(within.max, |n| reach(&n.hit, within.max));
         self.tree.closest(ray, Interval { max: limit(&nearest), ..within }, |object, _| {
-            self.consider(ray, within, self.bounded[object as usize], &mut nearest);
+            self.consider(ray, within, object as usize, &mut nearest);
             limit(&nearest)
         });
         nearest
@@ -118,7 +123,7 @@ impl<M> Scene<M> {
     pub fn occludes(&self, ray: &Ray, within: Interval) -> bool {
         let occludes = |object: usize| self.objects[object].shape.occludes(ray, within);
         self.unbounded.iter().any(|&object| occludes(object))
-            || self.tree.any(ray, within, |object| occludes(self.bounded[object as usize]))
+            || self.tree.any(ray, within, |object| occludes(object as usize))
     }
 
     /// The surface at `hit`, which [`intersect`](Self::intersect) answered for the same `ray`.

@@ -40,10 +40,8 @@ use std::ops::ControlFlow;
 #[derive(Clone, Debug)]
 pub struct Bvh {
     tree: Wide,
-    /// The objects in the order of the leaves.
+    /// Leaf i holds `objects[i]`.
     objects: Vec<u32>,
-    /// Leaf i holds `objects[starts[i]..starts[i + 1]]`.
-    starts: Vec<u32>,
     level: Level,
 }
 
@@ -91,8 +89,11 @@ impl Bvh {
         let built = build(boxes.len(), whole, &|i| boxes[i], OBJECTS_PER_LEAF, watch)?;
         watch.phase(1.0, 1);
         watch.add(1);
-        let tree = Self { tree: built.tree, objects: built.objects, starts: built.starts, level: Level::detect() };
-        (!watch.stopped()).then_some(tree)
+        if watch.stopped() {
+            return None;
+        }
+        assert_eq!(built.starts.len(), built.objects.len() + 1, "one object in a leaf");
+        Some(Self { tree: built.tree, objects: built.objects, level: Level::detect() })
     }
 
     /// Calls `visit(object, bound)` for every object whose box the ray meets between `within.min` and the bound,
@@ -146,13 +147,12 @@ impl Bvh {
     /// Bytes on the heap.
     #[must_use]
     pub fn memory(&self) -> usize {
-        self.tree.memory() + size_of::<u32>() * (self.objects.capacity() + self.starts.capacity())
+        self.tree.memory() + size_of::<u32>() * self.objects.capacity()
     }
 
     #[inline]
-    fn leaf(&self, leaf: u32) -> &[u32] {
-        let leaf = leaf as usize;
-        &self.objects[self.starts[leaf] as usize..self.starts[leaf + 1] as usize]
+    fn leaf(&self, leaf: u32) -> u32 {
+        self.objects[leaf as usize]
     }
 }
 
@@ -166,9 +166,7 @@ struct Nearest<'a, F> {
 impl<S: Simd, F: FnMut(u32, f64) -> f64> Closest<S> for Nearest<'_, F> {
     #[inline(always)]
     fn leaf(&mut self, _: S, leaf: u32) -> f32 {
-        for &object in self.bvh.leaf(leaf) {
-            self.bound = (self.visit)(object, self.bound);
-        }
+        self.bound = (self.visit)(self.bvh.leaf(leaf), self.bound);
         self.local.limits.upper(self.bound)
     }
 }
@@ -181,6 +179,6 @@ struct First<'a, F> {
 impl<S: Simd, F: FnMut(u32) -> bool> Any<S> for First<'_, F> {
     #[inline(always)]
     fn leaf(&mut self, _: S, leaf: u32) -> bool {
-        self.bvh.leaf(leaf).iter().any(|&object| (self.hits)(object))
+        (self.hits)(self.bvh.leaf(leaf))
     }
 }
