@@ -52,12 +52,16 @@ impl Aabb {
         if !self.is_finite() {
             return Self::EVERYTHING;
         }
-        let corner = |i: usize| {
-            let pick = |axis: usize| if i >> axis & 1 == 0 { self.min[axis] } else { self.max[axis] };
-            DVec3::new(pick(0), pick(1), pick(2))
-        };
-        let corners: [DVec3; 8] = std::array::from_fn(corner);
-        let image = Self::around_images(&corners, map);
+        // Each term of a coordinate is least at one end of its side; rounding as for points.
+        let (m, t) = (map.matrix3, map.translation);
+        let most = self.min.abs().max(self.max.abs());
+        let size = m.x_axis.abs() * most.x + m.y_axis.abs() * most.y + m.z_axis.abs() * most.z + t.abs();
+        let off = size * (4.0 * f64::EPSILON) + DVec3::splat(f64::MIN_POSITIVE);
+        let (x, u) = (m.x_axis * self.min.x, m.x_axis * self.max.x);
+        let (y, v) = (m.y_axis * self.min.y, m.y_axis * self.max.y);
+        let (z, w) = (m.z_axis * self.min.z, m.z_axis * self.max.z);
+        let image =
+            Self { min: x.min(u) + y.min(v) + z.min(w) + t - off, max: x.max(u) + y.max(v) + z.max(w) + t + off };
         if image.min.is_nan() || image.max.is_nan() { Self::EVERYTHING } else { image }
     }
 
