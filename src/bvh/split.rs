@@ -63,8 +63,8 @@ fn split_in_bins<S: Simd, const BINS: usize>(simd: S, items: &mut [Item], depth:
         most = most.max(m);
     }
     let extent: [f32; 4] = (most - least).into();
-    // The largest centre falls into the last bin. Subnormal extents divide to infinity.
-    let scale = extent.map(|e| (BINS - 1) as f32 * (1.0 - 1e-6) / e).map(|s| if s.is_finite() { s } else { 0.0 });
+    // Rounded to the nearest, the largest centre falls into the last bin. Subnormal extents divide to infinity.
+    let scale = extent.map(|e| (BINS - 1) as f32 / e).map(|s| if s.is_finite() { s } else { 0.0 });
     if scale[..3] == [0.0; 3] || depth >= DEEPEST_SAH {
         return halve(simd, items);
     }

@@ -109,8 +109,8 @@ impl<P: Product> Divisor<P> {
         if !(SAFE.contains(&size) && value.error < power(-60) * size) {
             return None;
         }
-        // The quotient's first digits are off by 3u of it, what they leave of the numerator is below 6u of that, formed
-        // with an error of 13u² and divided with one of 18u²; the rest is for what is of third order.
+        // What the quotient's first digits leave of the numerator is below 4u of that, formed with an error of 9u² and
+        // divided with one of 12u²; the rest is for what is of third order, and for rounding lo ± the bound.
         let error = value.error / size * INFLATE + 80.0 * U * U;
         Some(Self { reciprocal: value.hi.recip(), value, error })
     }
