@@ -35,6 +35,19 @@ fn stay_right() {
     }
 }
 
+/// Of every row of the report its ten worst cases; of meshes, which are long, three.
+#[test]
+fn every_row_is_kept() {
+    let lines: Vec<&str> = include_str!("worst-cases.txt").lines().filter(|l| !l.starts_with('#')).collect();
+    for family in support::families::all() {
+        let start = format!("{} {} truehit, ", family.kernel.name(), family.number);
+        let kept = lines.iter().filter(|l| l.starts_with(&start)).count();
+        let least = if family.kernel == Kernel::Mesh { 3 } else { 10 };
+        assert!(kept >= least, "{start}: {kept}");
+    }
+    println!("{} cases of {} families", lines.len(), support::families::all().len());
+}
+
 /// Shapes of any length are written and read as they are.
 #[test]
 fn cases_of_every_family_are_read_as_written() {

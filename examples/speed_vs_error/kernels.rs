@@ -3,6 +3,7 @@
 
 use crate::support::cases::{Case, Kernel, Solid};
 use truehit::glam::{DAffine3, DVec3};
+use truehit::kernel::tally::Tally;
 use truehit::{Hit, Interval, Ray};
 
 pub type Answer = Option<Hit>;
@@ -97,10 +98,21 @@ fn entry_hit((enter, _): (f64, f64)) -> Hit {
 impl Entry {
     /// The answer to one case; `None` where the shape is refused at the door.
     pub fn answer(&self, case: &Case) -> Option<Answer> {
+        self.counted(case).map(|counted| counted.0)
+    }
+
+    /// The answer, and how often it left a fast path on the way: making the shape does not count.
+    pub fn counted(&self, case: &Case) -> Option<(Answer, Tally)> {
+        let counted = |answer: &dyn Fn() -> Answer| {
+            let before = Tally::now();
+            let answer = answer();
+            (answer, Tally::now().since(before))
+        };
         if let Function::Shape(make) = self.function {
-            return Some(make(&case.solid)?.intersect(&case.ray, case.within));
+            let shape = make(&case.solid)?;
+            return Some(counted(&|| shape.intersect(&case.ray, case.within)));
         }
-        self.answers(&case.solid).then(|| call_solid(self.function, &case.ray, case.within, &case.solid))
+        self.answers(&case.solid).then(|| counted(&|| call_solid(self.function, &case.ray, case.within, &case.solid)))
     }
 
     /// The textbook has no kernel for meshes, whatever maps lie over them.

@@ -1,56 +1,29 @@
-//! The page, the CSV, the worst cases.
+//! The page.
 
+use crate::aftermath::Aftermath;
+use crate::fallbacks::Fallbacks;
 use crate::kernels::Origin;
-use crate::rows::{Row, per_million, quantile};
+use crate::peers;
+use crate::rows::{BINS, Row, has_parts_of, histogram, per_million, quantile};
 use crate::support::cases::Kernel;
-use crate::surfaces::SurfaceRow;
+use crate::tables::{self, cell};
 use crate::watertight::{AIMS, Sieve};
 use std::fmt::Write;
 
+/// Where the long run leaves its figures for this page.
+pub const FULL_CSV: &str = "docs/speed-vs-error-full.csv";
+
 pub struct Page<'a> {
     pub rows: &'a [Row],
-    pub surfaces: &'a [SurfaceRow],
+    pub ordinary: &'a [Fallbacks],
     pub sieves: &'a [Sieve],
     pub cases: usize,
     pub full: bool,
+    pub machine: String,
+    pub took: std::time::Duration,
 }
 
-/// Whether a row of the crate's own is less than promised.
-pub fn breaks_contract(row: &Row) -> bool {
-    let a = &row.accuracy;
-    let largest = a.quantile(1.0).unwrap_or(0.0);
-    let bounded = row.entry.kernel != Kernel::Slab;
-    a.wrong() > 0 || a.wrong_parts > 0 || (bounded && a.violations > 0) || largest > contract(row.entry.kernel)
-}
-
-/// λ's contract in ulps; an affine shape promises a bound and no more, and a box is only passed through.
-pub fn contract(kernel: Kernel) -> f64 {
-    match kernel {
-        Kernel::Affine => f64::INFINITY,
-        k => k.contract(),
-    }
-}
-
-pub fn shortcoming(row: &Row) -> String {
-    let a = &row.accuracy;
-    let mut parts = Vec::new();
-    let mut count = |n: usize, what: &str| {
-        if n > 0 {
-            parts.push(format!("{n} {what} of {}", a.answered));
-        }
-    };
-    count(a.false_misses, "false misses");
-    count(a.false_hits, "false hits");
-    count(a.wrong_parts, "wrong parts");
-    count(a.violations, "violated bounds");
-    let largest = a.quantile(1.0).unwrap_or(0.0);
-    if largest > contract(row.entry.kernel) {
-        parts.push(format!("{} ulp", ulps(Some(largest))));
-    }
-    parts.join(", ")
-}
-
-fn ulps(x: Option<f64>) -> String {
+pub fn ulps(x: Option<f64>) -> String {
     match x {
         None => "–".to_owned(),
         Some(x) if x.is_infinite() => "∞".to_owned(),
@@ -60,7 +33,7 @@ fn ulps(x: Option<f64>) -> String {
     }
 }
 
-fn ns(x: f64) -> String {
+pub fn ns(x: f64) -> String {
     if x >= 100.0 { format!("{x:.0}") } else { format!("{x:.1}") }
 }
 
@@ -72,16 +45,18 @@ fn command(program: &str, arguments: &[&str]) -> String {
         .map_or_else(|| "unknown".to_owned(), |s| s.trim().to_owned())
 }
 
-fn machine() -> String {
+/// The machine, the compiler, the commit: asked for before pictures are written over.
+pub fn machine() -> String {
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let cpu = info.lines().find_map(|l| l.strip_prefix("model name")?.split_once(": ")).map_or("unknown CPU", |m| m.1);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let flags = std::env::var("RUSTFLAGS").unwrap_or_default();
     let flags = if flags.is_empty() { "default flags (no target-cpu)".to_owned() } else { flags };
+    let level = format!("{:?}", fearless_simd::Level::new());
     format!(
-        "{cpu}, {threads} hardware threads, one used; {}; {flags}, profile release; SIMD level detected: {:?}; truehit {}",
+        "{cpu}, {threads} hardware threads, times on one; {}; {flags}, profile release; SIMD level detected: {}; truehit {}",
         command("rustc", &["-V"]),
-        fearless_simd::Level::new(),
+        level.split('(').next().unwrap_or_default(),
         command("git", &["describe", "--always", "--dirty"]),
     )
 }
@@ -90,11 +65,12 @@ fn machine() -> String {
 struct Sum {
     cases: usize,
     wrong: usize,
+    edges: usize,
     parts: usize,
     hits: usize,
     violations: usize,
-    p99: Option<f64>,
-    max: Option<f64>,
+    refined: usize,
+    ulps: Vec<f64>,
     ordinary: Option<(f64, f64)>,
     hard: f64,
 }
@@ -102,6 +78,16 @@ struct Sum {
 impl Page<'_> {
     fn of<'a>(&'a self, kernel: Kernel, name: &'a str) -> impl Iterator<Item = &'a Row> + Clone {
         self.rows.iter().filter(move |r| r.entry.kernel == kernel && r.entry.name == name)
+    }
+
+    fn shipped(&self) -> impl Iterator<Item = &Row> {
+        self.rows.iter().filter(|r| r.is_shipped())
+    }
+
+    /// The textbook's kernels on the same family.
+    fn textbook(&self, row: &Row) -> impl Iterator<Item = &Row> {
+        let (kernel, number) = (row.entry.kernel, row.number);
+        self.rows.iter().filter(move |r| r.entry.kernel == kernel && r.number == number && !r.is_shipped())
     }
 
     fn sum(&self, kernel: Kernel, name: &str) -> Sum {
@@ -113,11 +99,12 @@ impl Page<'_> {
         Sum {
             cases: rows().map(|r| r.accuracy.answered).sum(),
             wrong: rows().map(|r| r.accuracy.wrong()).sum(),
+            edges: rows().map(|r| r.accuracy.edges).sum(),
             parts: rows().map(|r| r.accuracy.wrong_parts).sum(),
             hits: rows().map(|r| r.accuracy.hits).sum(),
             violations: rows().map(|r| r.accuracy.violations).sum(),
-            p99: quantile(&all, 0.99),
-            max: quantile(&all, 1.0),
+            refined: rows().map(|r| r.accuracy.refined).sum(),
+            ulps: all,
             ordinary: rows().find(|r| r.number == 0).map(|r| (r.speed.throughput.median, r.speed.latency.median)),
             hard: quantile(&times, 0.5).unwrap_or(f64::NAN),
         }
@@ -140,16 +127,32 @@ impl Page<'_> {
         kernels
     }
 
+    /// What a figure means nothing without.
+    pub fn provenance(&self) -> String {
+        format!(
+            "{} cases a family, seeds of tests/support; {}; took {} min {} s",
+            self.cases,
+            self.machine,
+            self.took.as_secs() / 60,
+            self.took.as_secs() % 60
+        )
+    }
+
     pub fn markdown(&self) -> String {
         let mut out = String::new();
         self.head(&mut out);
         self.summary(&mut out);
         pictures(&mut out);
         self.losses(&mut out);
-        self.surfaces(&mut out);
-        meshes(&mut out);
+        self.fallbacks(&mut out);
+        self.histograms(&mut out);
+        self.aftermath(&mut out);
+        peers::section(&mut out);
         self.sieves(&mut out);
-        self.details(&mut out);
+        if !self.full {
+            long_run(&mut out);
+        }
+        tables::details(&mut out, self.rows, &self.kernels());
         out
     }
 
@@ -157,17 +160,15 @@ impl Page<'_> {
         let _ = write!(
             out,
             "# Speed against error\n\n\
-             Generated by `cargo run --release --example speed_vs_error{}`; do not edit. {} cases a family, seeds fixed in\n\
-             `tests/support`: the counts below come out the same on every machine, the times do not.\n\n\
-             {}.\n\n\
+             Generated by `cargo run --release --example speed_vs_error{}`; do not edit. Seeds are fixed in `tests/support`: the\n\
+             counts below come out the same on every machine, the times do not. {}.\n\n\
              Truth is exact: the inputs are floats, so every sign is decided in big integers and every λ is enclosed to 250\n\
              bits (docs/numerics.md §12). Shipped and textbook kernels run through one table of function pointers over the\n\
              same cases. An ulp is one of f64 at max(|λ|, 2⁻⁴⁰ s), s the largest coordinate over |d|; f32 kernels get their\n\
              input rounded to f32 and are measured with the same ruler. A count of zero in n cases is given as `0 (< 3/n)`,\n\
-             its bound with 95 % confidence, per million.\n\n",
+             its bound with 95 % confidence.\n\n",
             if self.full { " -- --full" } else { "" },
-            self.cases,
-            machine(),
+            self.provenance(),
         );
     }
 
@@ -175,30 +176,46 @@ impl Page<'_> {
         out.push_str(
             "## In short\n\n\
              *ordinary*: ns a ray on ordinary rays, independent / each waiting for the last. *hard*: the median family's\n\
-             ns. Errors and counts over all families, most of them hard.\n\n\
-             | kernel | | ordinary, ns | hard, ns | λ ulp p99 | max | wrong hit or miss, ppm | wrong part, ppm | bound broken, ppm |\n\
-             |---|---|---:|---:|---:|---:|---:|---:|---:|\n",
+             ns. Errors and counts over all families, most of them hard; ppm: per million.\n\n\
+             | kernel | | ordinary, ns | hard, ns | λ ulp p99 | max | wrong hit or miss, ppm | wrong part, ppm | bound broken, ppm | fast path left, ppm |\n\
+             |---|---|---:|---:|---:|---:|---:|---:|---:|---:|\n",
         );
         for (kernel, names) in self.kernels() {
             for (name, origin) in names {
                 let s = self.sum(kernel, name);
                 let ordinary = s.ordinary.map_or("–".to_owned(), |(t, l)| format!("{} / {}", ns(t), ns(l)));
-                let bound = match origin {
-                    Origin::Shipped if kernel != Kernel::Slab => per_million(s.violations, s.hits),
+                let shipped = origin == Origin::Shipped;
+                let bound = match kernel {
+                    Kernel::Slab => "none given".to_owned(),
+                    _ if shipped => per_million(s.violations, s.hits),
                     _ => "none given".to_owned(),
                 };
-                let bold = if origin == Origin::Shipped { "**" } else { "" };
+                let bold = if shipped { "**" } else { "" };
+                let edges = if s.edges > 0 { "¹" } else { "" };
                 let _ = writeln!(
                     out,
-                    "| {} | {bold}{name}{bold} | {ordinary} | {} | {} | {} | {} | {} | {bound} |",
+                    "| {} | {bold}{name}{bold} | {ordinary} | {} | {} | {} | {}{edges} | {} | {bound} | {} |",
                     kernel.name(),
                     ns(s.hard),
-                    ulps(s.p99),
-                    ulps(s.max),
+                    ulps(quantile(&s.ulps, 0.99)),
+                    ulps(s.ulps.last().copied()),
                     per_million(s.wrong, s.cases),
-                    per_million(s.parts, s.hits),
+                    if has_parts_of(kernel) { per_million(s.parts, s.hits) } else { "–".to_owned() },
+                    if shipped { per_million(s.refined, s.cases) } else { "–".to_owned() },
                 );
             }
+        }
+        let (differ, exact): (Vec<usize>, Vec<usize>) =
+            self.shipped().map(|r| (r.accuracy.wrong(), r.accuracy.edges)).filter(|(_, edges)| *edges > 0).unzip();
+        if !differ.is_empty() {
+            let _ = write!(
+                out,
+                "\n¹ Against the exact image of the ray. An affine shape decides, exactly, for that image with each component\n\
+                 rounded once (`Affine::object_ray`): {} of these {} decisions are right for it, and how far it is from the\n\
+                 exact image is checked in each. See *Where truehit loses*.\n",
+                exact.iter().sum::<usize>(),
+                differ.iter().sum::<usize>(),
+            );
         }
         out.push('\n');
     }
@@ -206,25 +223,38 @@ impl Page<'_> {
     /// Where the crate's kernels are not the fastest, or not as good as promised.
     fn losses(&self, out: &mut String) {
         out.push_str("## Where truehit loses\n\n");
-        let broken: Vec<&Row> =
-            self.rows.iter().filter(|r| r.entry.origin == Origin::Shipped && breaks_contract(r)).collect();
+        let broken: Vec<_> = self.shipped().map(|r| (r, r.shortcomings())).filter(|(_, s)| !s.is_empty()).collect();
         if broken.is_empty() {
             out.push_str(
-                "No row breaks its contract: no wrong decision, no wrong part, no broken bound, λ within its ulps.\n\n",
+                "No row breaks its contract: no wrong decision, no wrong part, no broken bound on λ or a point, λ within its\n\
+                 ulps (1 for plane and sphere, 4 for the others; the bound alone where a ray grazes an affine shape or starts on\n\
+                 it), no ray that leaves a surface and meets it again.\n\n",
             );
         } else {
             out.push_str("Rows that break their contract:\n\n| kernel | family | |\n|---|---|---|\n");
-            for r in &broken {
-                let _ = writeln!(out, "| {} | {} {} | {} |", r.entry.kernel.name(), r.number, r.family, shortcoming(r));
+            for (r, shortcomings) in &broken {
+                let shortcomings = shortcomings.join(", ");
+                let _ =
+                    writeln!(out, "| {} | {} {} | {shortcomings} |", r.entry.kernel.name(), r.number, cell(r.family));
             }
             out.push('\n');
-            if broken.iter().any(|r| r.entry.kernel == Kernel::Affine) {
-                out.push_str(
-                    "An affine shape decides for the ray's image with each component rounded once (`Affine::object_ray`); counted\n\
-                     here is against the exact image. tests/exact.rs holds that nothing but this rounding makes the difference.\n\n",
-                );
-            }
         }
+        for r in self.shipped().filter(|r| r.accuracy.edges > 0) {
+            let a = &r.accuracy;
+            let _ = write!(
+                out,
+                "Not the exact image's decision, though the rounded one's, as promised: {} {} {}, {} of {} rays (missed {},\n\
+                 invented {}).\n\n",
+                r.entry.kernel.name(),
+                r.number,
+                r.family,
+                a.edges,
+                a.answered,
+                a.false_misses,
+                a.false_hits,
+            );
+        }
+        self.neither(out);
         out.push_str(
             "Time, as a multiple of the fastest textbook kernel of the same shape on the same rays (right or wrong), and of\n\
              the fastest among those with no wrong decision on that family:\n\n\
@@ -273,34 +303,143 @@ impl Page<'_> {
         }
         out.push('\n');
     }
-
-    fn surfaces(&self, out: &mut String) {
-        out.push_str(
-            "## Points, normals, spawned rays\n\n\
-             At exact hits of all families of a shape. *point*: distance of the point given from the surface, in ulps of the\n\
-             largest coordinate of point and shape. *normal*: angle to the exact normal at the exact hit, in units of 2⁻⁵³ rad.\n\
-             *re-hits*: rays that leave the point outward and meet the same shape again (of a mesh, the same triangle),\n\
-             which is wrong. Affine shapes are those that their stored maps define. Cones' walls within 1e-9 of an apex,\n\
-             where normals have no direction, are left out.\n\
-             Textbook: o + λd, the normal from it, and the ray from it as it is.\n\n\
-             | shape | | hits | point, ulp p50 / max | bound broken | normal p50 / max | re-hits of n |\n\
-             |---|---|---:|---:|---:|---:|---:|\n",
+    /// Rows in which somebody is faster and truehit is not exact.
+    fn neither(&self, out: &mut String) {
+        let rows: Vec<_> = self
+            .shipped()
+            .filter_map(|r| {
+                let time = |r: &&Row| r.speed.throughput.median;
+                let fastest = self.textbook(r).min_by(|a, b| time(a).total_cmp(&time(b)))?;
+                (time(&fastest) < time(&r) && !r.accuracy.is_exact()).then_some((r, fastest))
+            })
+            .collect();
+        if rows.is_empty() {
+            out.push_str(
+                "In every row truehit is the fastest or exact: all decided rightly, each λ the nearest float.\n\n",
+            );
+            return;
+        }
+        let _ = write!(
+            out,
+            "Neither the fastest nor exact (all decided rightly, each λ the nearest float): {} of {} rows.\n\n\
+             | kernel | family | ns | largest λ error, ulp | wrong | fastest | its ns | its λ error | wrong |\n\
+             |---|---|---:|---:|---:|---|---:|---:|---:|\n",
+            rows.len(),
+            self.shipped().count(),
         );
-        for s in self.surfaces {
+        for (r, fastest) in rows {
+            let figures = |r: &Row| {
+                let a = &r.accuracy;
+                (ns(r.speed.throughput.median), ulps(a.max()), a.wrong() + a.wrong_parts)
+            };
+            let (own, other) = (figures(r), figures(fastest));
             let _ = writeln!(
                 out,
-                "| {} | {} | {} | {} / {} | {} | {} / {} | {} of {} |",
-                s.kernel.name(),
-                s.name,
-                s.points.len(),
-                ulps(quantile(&s.points, 0.5)),
-                ulps(quantile(&s.points, 1.0)),
-                s.violations.map_or("none given".to_owned(), |v| v.to_string()),
-                ulps(quantile(&s.normals, 0.5)),
-                ulps(quantile(&s.normals, 1.0)),
-                s.rehits,
-                s.spawned,
+                "| {} | {} {} | {} | {} | {} | {} | {} | {} | {} |",
+                r.entry.kernel.name(),
+                r.number,
+                cell(r.family),
+                own.0,
+                own.1,
+                own.2,
+                fastest.entry.name,
+                other.0,
+                other.1,
+                other.2,
             );
+        }
+        out.push('\n');
+    }
+
+    fn fallbacks(&self, out: &mut String) {
+        out.push_str(
+            "## How often a fast path does not do\n\n\
+             Of ordinary rays, counted by the kernels themselves: *refined* left a fast path, *exact* went on in integers, since\n\
+             double-double could not settle them either. By family: below.\n\n\
+             | kernel | rays | hits | refined | ppm | exact | ppm |\n|---|---:|---:|---:|---:|---:|---:|\n",
+        );
+        for f in self.ordinary {
+            let _ = writeln!(
+                out,
+                "| {} | {} | {} | {} | {} | {} | {} |",
+                f.kernel.name(),
+                f.rays,
+                f.hits,
+                f.refined,
+                per_million(f.refined, f.rays),
+                f.exact,
+                per_million(f.exact, f.rays),
+            );
+        }
+        out.push('\n');
+    }
+
+    fn histograms(&self, out: &mut String) {
+        let mut head = String::from("| kernel | | hits | λ exact |");
+        for pair in BINS.windows(2) {
+            let _ = write!(
+                head,
+                " ≤ {} |",
+                if pair[1] < 1000.0 { pair[1].to_string() } else { format!("{:.0e}", pair[1]) }
+            );
+        }
+        let _ = write!(
+            out,
+            "## λ error, by size\n\n\
+             Hits of all families by |λ − exact λ| in ulps; each column without what is in those before it.\n\n\
+             {head} more |\n|---|---|{}\n",
+            "---:|".repeat(BINS.len() + 2)
+        );
+        for (kernel, names) in self.kernels() {
+            for (name, origin) in names {
+                let ulps = self.sum(kernel, name).ulps;
+                let counts = histogram(&ulps).map(|c| c.to_string());
+                let bold = if origin == Origin::Shipped { "**" } else { "" };
+                let _ = writeln!(
+                    out,
+                    "| {} | {bold}{name}{bold} | {} | {} |",
+                    kernel.name(),
+                    ulps.len(),
+                    counts.join(" | ")
+                );
+            }
+        }
+        out.push('\n');
+    }
+
+    fn aftermath(&self, out: &mut String) {
+        out.push_str(
+            "## Points, normals, spawned rays\n\n\
+             At exact hits, in a quarter of the cases of all families of a shape. *point*: distance of the point given from the\n\
+             surface, in ulps of the largest coordinate of point and shape. *normal*: angle to the exact normal at the exact hit,\n\
+             in units of 2⁻⁵³ rad. *re-hits*: rays that leave the point outward and meet the same shape again (of a mesh, the\n\
+             same triangle), which is wrong. Affine shapes are those that their stored maps define. Cones' walls within 1e-9 of\n\
+             an apex, where normals have no direction, are left out. Boxes are passed through and have none of these.\n\
+             Textbook: o + λd, the normal there, the ray from there as it is, all in the kernel's precision.\n\n\
+             | shape | | hits | point, ulp p50 / max | bound broken | normal p50 / max | re-hits | ppm |\n\
+             |---|---|---:|---:|---:|---:|---:|---:|\n",
+        );
+        for (kernel, names) in self.kernels().into_iter().filter(|k| k.0 != Kernel::Slab) {
+            for (name, origin) in names {
+                let mut f = Aftermath::default();
+                self.of(kernel, name).for_each(|r| f.merge(&r.aftermath));
+                let shipped = origin == Origin::Shipped;
+                let bold = if shipped { "**" } else { "" };
+                let _ = writeln!(
+                    out,
+                    "| {} | {bold}{name}{bold} | {} | {} / {} | {} | {} / {} | {} of {} | {} |",
+                    kernel.name(),
+                    f.points.len(),
+                    ulps(quantile(&f.points, 0.5)),
+                    ulps(f.points.last().copied()),
+                    if shipped { f.violations.to_string() } else { "none given".to_owned() },
+                    ulps(quantile(&f.normals, 0.5)),
+                    ulps(f.normals.last().copied()),
+                    f.rehits,
+                    f.spawned,
+                    per_million(f.rehits, f.spawned),
+                );
+            }
         }
         out.push('\n');
     }
@@ -338,175 +477,62 @@ impl Page<'_> {
         }
         out.push('\n');
     }
-
-    fn details(&self, out: &mut String) {
-        out.push_str(
-            "## Every family\n\n\
-             ns: independent rays, median [quartiles] / chained. *slow*: rays that take more than four times the kernel's\n\
-             typical ordinary ray, each timed alone. It is a proxy, by time, for the share that leaves the fast path: that is\n\
-             counted in test builds only, so that it costs nothing here, and `cargo test --lib ordinary_rays -- --nocapture`\n\
-             prints it for ordinary rays of plane, triangle, sphere and frustum, and holds it below one in 10,000. *near 0*: of hits with\n\
-             |λ| < 2⁻²⁰ s, the largest error of λ·|d| in ulps of the largest coordinate. Wrong: missed + invented, of n cases; hits by exact count.\n\n",
-        );
-        for (kernel, names) in self.kernels() {
-            let _ = writeln!(out, "<details><summary>{}</summary>\n", kernel.name());
-            for (name, origin) in names {
-                let _ = writeln!(
-                    out,
-                    "**{} {name}**\n\n| family | n (hits) | ns | slow (proxy) | λ ulp p50 | p99 | max | near 0 | wrong | part | bound broken | bound/error p50 |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
-                    kernel.name(),
-                );
-                for r in self.of(kernel, name) {
-                    let a = &r.accuracy;
-                    let bounded = origin == Origin::Shipped && kernel != Kernel::Slab;
-                    let refused = if a.refused > 0 { format!(", {} refused", a.refused) } else { String::new() };
-                    let t = &r.speed.throughput;
-                    let _ = writeln!(
-                        out,
-                        "| {} {} | {} ({}{refused}) | {} [{}–{}] / {} | {:.1} % | {} | {} | {} | {} | {} + {} | {} | {} | {} |",
-                        r.number,
-                        r.family,
-                        r.cases,
-                        r.truth_hits,
-                        ns(t.median),
-                        ns(t.low),
-                        ns(t.high),
-                        ns(r.speed.latency.median),
-                        100.0 * r.slow,
-                        ulps(a.quantile(0.5)),
-                        ulps(a.quantile(0.99)),
-                        ulps(a.quantile(1.0)),
-                        if a.near_zero > 0 { ulps(Some(a.coordinate_ulps)) } else { "–".to_owned() },
-                        a.false_misses,
-                        a.false_hits,
-                        a.wrong_parts,
-                        if bounded { a.violations.to_string() } else { "–".to_owned() },
-                        if bounded { ulps(quantile(&a.tightness, 0.5)) } else { "–".to_owned() },
-                    );
-                }
-                out.push('\n');
-            }
-            out.push_str("</details>\n\n");
-        }
-    }
-
-    pub fn csv(&self) -> String {
-        let mut out = String::from(
-            "shape,kernel,origin,family number,family,cases,hits,refused,false misses,false hits,wrong parts,bounds broken,\
-             ulp p50,ulp p99,ulp max,coordinate ulp max,bound/error p50,ns,ns low quartile,ns high quartile,ns chained,slow share\n",
-        );
-        for r in self.rows {
-            let (a, t) = (&r.accuracy, &r.speed.throughput);
-            let number = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.4e}"));
-            let _ = writeln!(
-                out,
-                "{},{},{:?},{},\"{}\",{},{},{},{},{},{},{},{},{},{},{:.4e},{},{:.2},{:.2},{:.2},{:.2},{:.4}",
-                r.entry.kernel.name(),
-                r.entry.name,
-                r.entry.origin,
-                r.number,
-                r.family,
-                r.cases,
-                r.truth_hits,
-                a.refused,
-                a.false_misses,
-                a.false_hits,
-                a.wrong_parts,
-                a.violations,
-                number(a.quantile(0.5)),
-                number(a.quantile(0.99)),
-                number(a.quantile(1.0)),
-                a.coordinate_ulps,
-                number(quantile(&a.tightness, 0.5)),
-                t.median,
-                t.low,
-                t.high,
-                r.speed.latency.median,
-                r.slow,
-            );
-        }
-        out
-    }
-
-    /// The ten worst cases of each of the crate's own rows, for `tests/worst_cases.rs`; of meshes, which are long, three.
-    pub fn worst_cases(&self) -> String {
-        let mut out =
-            String::from("# Written by examples/speed_vs_error: shape, family, how far λ is off, the case.\n");
-        for r in self.rows.iter().filter(|r| r.entry.origin == Origin::Shipped) {
-            let kept = if r.entry.kernel == Kernel::Mesh { 3 } else { 10 };
-            for (_, text) in r.accuracy.worst.iter().take(kept) {
-                let _ = writeln!(out, "{} {} {text}", r.entry.kernel.name(), r.number);
-            }
-        }
-        out
-    }
 }
 
-/// What `benches/peers` found, if it has been run.
-fn meshes(out: &mut String) {
-    let _ = writeln!(out, "## Meshes\n");
-    let Ok(csv) = std::fs::read_to_string("benches/peers/results/peers.csv") else {
-        out.push_str("`benches/peers` has not been run here: its results/peers.csv is missing.\n\n");
+/// What `--full` has found, from the CSV that it left.
+fn long_run(out: &mut String) {
+    let Ok(csv) = std::fs::read_to_string(FULL_CSV) else { return };
+    let mut lines = csv.lines();
+    let provenance = lines.next().unwrap_or_default().trim_start_matches("# ");
+    let header = lines.next().unwrap_or_default();
+    if !header.starts_with(tables::COLUMNS) {
+        let _ = writeln!(out, "## The long run\n\n{FULL_CSV} is of another version of this report.\n");
         return;
-    };
-    // mesh,"engine",what,value
-    let records: Vec<(&str, &str, &str, f64)> = csv
-        .lines()
-        .skip(1)
+    }
+    // Names of families are in quotes and may hold commas.
+    let records: Vec<Vec<&str>> = lines
         .filter_map(|line| {
-            let (mesh, rest) = line.split_once(",\"")?;
-            let (engine, rest) = rest.split_once("\",")?;
-            let (what, value) = rest.rsplit_once(',')?;
-            Some((mesh, engine, what, value.parse().ok()?))
+            let (before, rest) = line.split_once('"')?;
+            let (_, after) = rest.split_once("\",")?;
+            Some(before.trim_end_matches(',').split(',').chain(["family"]).chain(after.split(',')).collect())
         })
         .collect();
-    let mut engines: Vec<&str> = Vec::new();
-    let mut meshes: Vec<&str> = Vec::new();
-    for r in &records {
-        if !meshes.contains(&r.0) {
-            meshes.push(r.0);
-        }
-        if r.1 != "–" && !engines.contains(&r.1) {
-            engines.push(r.1);
-        }
-    }
-    let sum = |engine: &str, what: &dyn Fn(&str) -> bool| -> f64 {
-        records.iter().filter(|r| r.1 == engine && what(r.2)).map(|r| r.3).sum()
-    };
-    let aimed = sum("–", &|w| w.starts_with("rays aimed"));
-    let checked = sum("–", &|w| w.ends_with("checked"));
-    let _ = writeln!(
+    let names: Vec<&str> = header.split(',').collect();
+    let column = |name: &str| names.iter().position(|n| *n == name);
+    let number = |r: &[&str], name: &str| column(name).and_then(|c| r.get(c)?.parse::<f64>().ok());
+    let _ = write!(
         out,
-        "From `benches/peers` ({}): speed as ratios to {}, geometric means over the meshes; leaks of {aimed} rays from inside\n\
-         closed meshes at vertices, edges and faces; and answers that exact arithmetic contradicts among {checked} rays\n\
-         (contested ones and an even sample).\n",
-        meshes.join(", "),
-        engines.first().unwrap_or(&"–"),
+        "## The long run\n\n\
+         `cargo run --release --example speed_vs_error -- --full`, by its CSV (speed-vs-error-full.csv): {provenance}.\n\n\
+         | kernel | | cases | hits | wrong hit or miss | exact for the rounded ray | wrong part | bound broken | λ ulp max | refined | exact | re-hits of n |\n\
+         |---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n"
     );
-    let sets = ["primary", "bounce", "random", "shadow", "bounce any", "random any"];
-    let _ = writeln!(
-        out,
-        "| | {} | leaks: vertices | edges | faces | missed | invented | other triangle |",
-        sets.join(" | ")
-    );
-    let _ = writeln!(out, "|---|{}", "---:|".repeat(12));
-    for engine in &engines {
-        let cells: Vec<String> = sets
-            .iter()
-            .map(|set| {
-                let what = format!("{set} ratio");
-                let logs: Vec<f64> =
-                    records.iter().filter(|r| r.1 == *engine && r.2 == what).map(|r| r.3.ln()).collect();
-                if logs.is_empty() {
-                    "–".to_owned()
-                } else {
-                    format!("{:.2}", (logs.iter().sum::<f64>() / logs.len() as f64).exp())
-                }
-            })
-            .collect();
-        let leaks = ["vertices", "edges", "faces"].map(|k| sum(engine, &|w| w == format!("leaks at {k}")).to_string());
-        let wrong = ["missed", "invented", "other triangle"].map(|k| sum(engine, &|w| w.ends_with(k)).to_string());
-        let _ = writeln!(out, "| {engine} | {} | {} | {} |", cells.join(" | "), leaks.join(" | "), wrong.join(" | "));
+    let mut kernels: Vec<[&str; 3]> = records.iter().map(|r| [r[0], r[1], r[2]]).collect();
+    kernels.dedup();
+    let mut seen = Vec::new();
+    kernels.retain(|k| !seen.contains(k) && (seen.push(*k), k[2] != "TextbookF32").1);
+    for [shape, kernel, origin] in kernels {
+        let rows = || records.iter().filter(|r| r[0] == shape && r[1] == kernel);
+        let sum = |name: &str| rows().filter_map(|r| number(r, name)).sum::<f64>() as u64;
+        let most = rows().filter_map(|r| number(r, "ulp max")).reduce(f64::max);
+        let shipped = origin == "Shipped";
+        let own = |name: &str| if shipped { sum(name).to_string() } else { "–".to_owned() };
+        let bold = if shipped { "**" } else { "" };
+        let _ = writeln!(
+            out,
+            "| {shape} | {bold}{kernel}{bold} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} of {} |",
+            sum("answered"),
+            sum("right hits"),
+            sum("false misses") + sum("false hits"),
+            own("exact for the rounded ray"),
+            sum("wrong parts"),
+            own("bounds broken"),
+            ulps(most),
+            own("refined"),
+            own("exact"),
+            sum("re-hits"),
+            sum("spawned"),
+        );
     }
     out.push('\n');
 }

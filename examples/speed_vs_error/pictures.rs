@@ -1,8 +1,8 @@
 //! Two pictures of one scene, where the eye sees it.
 
+use crate::aftermath::textbook_normal;
 use crate::kernels::{Entry, Function, Origin};
 use crate::support::cases::{Case, Kernel, Solid};
-use crate::surfaces::textbook_normal;
 use crate::table;
 use image::{Rgb, RgbImage};
 use std::path::Path;

@@ -21,25 +21,12 @@ impl Spread {
 }
 
 /// What is known of a kernel's speed on a family.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Speed {
     /// Independent rays, one after the other.
     pub throughput: Spread,
     /// Each ray waits for the answer to the one before.
     pub latency: Spread,
-    /// Each ray alone, least of some repetitions.
-    pub single: Vec<f64>,
-}
-
-impl Speed {
-    /// The share of rays that take more than `limit` ns: how a refined ray shows from outside, at no cost inside.
-    pub fn slower_than(&self, limit: f64) -> f64 {
-        self.single.iter().filter(|&&t| t > limit).count() as f64 / self.single.len().max(1) as f64
-    }
-
-    pub fn typical(&self) -> f64 {
-        Spread::of(self.single.clone()).median
-    }
 }
 
 struct Pass {
@@ -61,30 +48,23 @@ impl Timer<f64> for Pass {
     }
 }
 
-struct Singles;
-
-impl Timer<Vec<f64>> for Singles {
-    fn time(self, count: usize, mut call: impl FnMut(usize, u64) -> Answer) -> Vec<f64> {
-        const REPEATED: u32 = 12;
-        let one = |i| {
-            let run = |call: &mut dyn FnMut(usize, u64) -> Answer| {
-                let start = Instant::now();
-                for _ in 0..REPEATED {
-                    black_box(call(i, 0));
+/// Times kernels on the same cases, in turns, so that what disturbs one disturbs all.
+pub fn race(runners: &[(&Entry, Prepared)], rounds: usize) -> Vec<Speed> {
+    let mut samples = vec![[Vec::new(), Vec::new()]; runners.len()];
+    for round in 0..=rounds {
+        for ((entry, prepared), samples) in runners.iter().zip(&mut samples) {
+            for (linked, samples) in [false, true].into_iter().zip(samples) {
+                let time = entry.each(prepared, Pass { linked });
+                // The first round warms up.
+                if round > 0 {
+                    samples.push(time);
                 }
-                start.elapsed().as_nanos() as f64 / f64::from(REPEATED)
-            };
-            (0..4).map(|_| run(&mut call)).fold(f64::INFINITY, f64::min)
-        };
-        (0..count).map(one).collect()
+            }
+        }
     }
-}
-
-/// Times a kernel on prepared cases. Small families are run through several times in a pass.
-pub fn speed(entry: &Entry, prepared: &Prepared, rounds: usize) -> Speed {
-    let pass = |linked| entry.each(prepared, Pass { linked });
-    pass(false);
-    let throughput = (0..rounds).map(|_| pass(false)).collect();
-    let latency = (0..rounds).map(|_| pass(true)).collect();
-    Speed { throughput: Spread::of(throughput), latency: Spread::of(latency), single: entry.each(prepared, Singles) }
+    let speed = |[throughput, latency]: [Vec<f64>; 2]| Speed {
+        throughput: Spread::of(throughput),
+        latency: Spread::of(latency),
+    };
+    samples.into_iter().map(speed).collect()
 }

@@ -147,7 +147,7 @@ impl Row {
 
 /// Whether an affine shape's answer is not that of the exact image of the ray, but that of the rounded image: another
 /// decision, or another piece or end of the surface. How far the two images are apart is checked in every case.
-fn is_borderline(case: &Case, truth: Option<&Truth>, answer: Option<&Hit>) -> bool {
+pub fn is_borderline(case: &Case, truth: Option<&Truth>, answer: Option<&Hit>) -> bool {
     let ray = object_ray(case);
     let right = match (truth, answer) {
         (None, None) => true,

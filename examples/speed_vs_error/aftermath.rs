@@ -1,125 +1,111 @@
 //! What follows a hit: its point, its normal, and the ray that leaves it.
 
-use crate::kernels::{Answer, Entry, Function, Origin};
+use crate::kernels::{Entry, Origin};
+use crate::rows::Sheet;
 use crate::support::big::{Big, Big3};
-use crate::support::cases::{Case, Kernel, Solid};
+use crate::support::cases::{Case, Solid};
 use crate::support::measure;
-use crate::support::oracle::{self, WALL};
+use crate::support::oracle::{self, Truth, WALL};
 use crate::support::rng::Rng;
-use crate::support::shapes::as_stored;
 use crate::table;
 use truehit::glam::{DAffine3, DVec3};
 use truehit::{Hit, Interval, Ray, Shape, Surface};
 
-/// One way to answer, on all families of one shape.
-pub struct SurfaceRow {
-    pub kernel: Kernel,
-    pub name: &'static str,
+/// How points, normals and the rays that leave them come out.
+#[derive(Clone, Default)]
+pub struct Aftermath {
     /// Distance of the point from the surface in ulps of the largest coordinate, ascending.
     pub points: Vec<f64>,
     /// Points farther off than their bound, where there is one.
-    pub violations: Option<usize>,
+    pub violations: usize,
     /// Angle to the exact normal, in units of 2⁻⁵³ rad, ascending.
     pub normals: Vec<f64>,
     pub spawned: usize,
     pub rehits: usize,
 }
 
-/// The shapes whose points and normals are looked at.
-const SHAPES: [Kernel; 8] = [
-    Kernel::Plane,
-    Kernel::Triangle,
-    Kernel::Polygon,
-    Kernel::Sphere,
-    Kernel::Cylinder,
-    Kernel::Cone,
-    Kernel::Mesh,
-    Kernel::Affine,
-];
-
-pub fn all(cases: usize, wanted: &impl Fn(Kernel) -> bool) -> Vec<SurfaceRow> {
-    let entries = table::all();
-    let mut rows = Vec::new();
-    for kernel in SHAPES.into_iter().filter(|k| wanted(*k)) {
-        let families: Vec<_> = crate::support::families::all().into_iter().filter(|f| f.kernel == kernel).collect();
-        let cases: Vec<Case> =
-            families.iter().flat_map(|f| (0..cases.div_ceil(4)).map(|i| as_stored(f.case(i)))).collect();
-        let names =
-            ["Möller–Trumbore f64", "odd/even f64", "slide formula f64", "textbook f64", "mapped ray f64", "truehit"];
-        for name in names {
-            let entry = entries.iter().find(|e| e.kernel == kernel && e.name == name);
-            rows.extend(entry.map(|e| row(e, &cases)));
+impl Aftermath {
+    /// At those of the first `n` cases that exact arithmetic hits too, in a part of the surface that it agrees to.
+    pub fn of(entry: &Entry, sheet: &Sheet, n: usize) -> Self {
+        let mut out = Self::default();
+        for (i, (case, truth)) in sheet.cases.iter().zip(&sheet.truths).enumerate().take(n) {
+            let Some(truth) = truth else { continue };
+            out.add(entry, case, truth, i as u64);
         }
+        out.points.sort_by(f64::total_cmp);
+        out.normals.sort_by(f64::total_cmp);
+        out
     }
-    rows
-}
 
-fn row(entry: &Entry, cases: &[Case]) -> SurfaceRow {
-    let shipped = entry.origin == Origin::Shipped;
-    let mut out = SurfaceRow {
-        kernel: entry.kernel,
-        name: entry.name,
-        points: Vec::new(),
-        violations: shipped.then_some(0),
-        normals: Vec::new(),
-        spawned: 0,
-        rehits: 0,
-    };
-    for (i, case) in cases.iter().enumerate() {
+    pub fn merge(&mut self, other: &Self) {
+        self.points.extend(&other.points);
+        self.normals.extend(&other.normals);
+        self.points.sort_by(f64::total_cmp);
+        self.normals.sort_by(f64::total_cmp);
+        self.violations += other.violations;
+        self.spawned += other.spawned;
+        self.rehits += other.rehits;
+    }
+
+    fn add(&mut self, entry: &Entry, case: &Case, truth: &Truth, seed: u64) {
+        let shipped = entry.origin == Origin::Shipped;
         let size = largest(&case.solid).max(case.ray.origin.abs().max_element());
-        // Figures in floats: the ends of their range are the other table's.
+        // Figures in floats: the ends of their range are left to λ.
         let tame = |x: f64| x == 0.0 || (1e-60..1e60).contains(&x.abs());
         let d = case.ray.direction;
         if !(tame(size) && tame(d.abs().max_element()) && tame(smallest(&case.solid))) {
-            continue;
+            return;
         }
-        let Some(truth) = oracle::truth(case) else { continue };
-        let Some(shape) = table::make_shape(&case.solid) else { continue };
+        let Some(shape) = table::make_shape(&case.solid) else { return };
         let Some(hit) = (if shipped { shape.intersect(&case.ray, case.within) } else { entry.answer(case).flatten() })
         else {
-            continue;
+            return;
         };
         if !truth.parts.contains(&hit.part) || !hit.lambda.is_finite() {
-            continue;
+            return;
         }
         let lambda = truth.lambda.enclosure().lo;
         let exact_point = Big3(std::array::from_fn(|k| {
             &Big::from(case.ray.origin[k]) + &(&lambda * &Big::from(case.ray.direction[k]))
         }));
-        let Some(exact_normal) = normal_at(&case.solid, &exact_point, hit.part) else { continue };
+        let Some(exact_normal) = normal_at(&case.solid, &exact_point, hit.part) else { return };
         let (point, bound, normal) = if shipped {
             let p = shape.point(&case.ray, &hit);
             (p.position, p.error, shape.normal(&case.ray, &hit))
         } else {
-            let p = case.ray.at(hit.lambda);
-            let normal = normal_at(&case.solid, &p.into(), hit.part).unwrap_or(DVec3::NAN);
-            (p, f64::INFINITY, normal)
+            let p = textbook_point(entry.origin, &case.ray, &hit);
+            let normal = if p.is_finite() { normal_at(&case.solid, &p.into(), hit.part) } else { None };
+            (p, f64::INFINITY, normal.unwrap_or(DVec3::NAN))
         };
         if !point.is_finite() || near_apex(&case.solid, &exact_point, hit.part) {
-            continue;
+            return;
         }
         let off = distance(&case.solid, &point.into(), hit.part);
         // A point's own size: a hit near the origin from far away is judged by where it is.
-        out.points.push(off / measure::ulp(point.abs().max_element().max(largest(&case.solid))));
-        if let Some(v) = &mut out.violations {
-            *v += usize::from(off > bound * (1.0 + 1e-12));
-        }
-        out.normals.push((normal - exact_normal).length() / 2f64.powi(-53));
+        self.points.push(off / measure::ulp(point.abs().max_element().max(largest(&case.solid))));
+        self.violations += usize::from(off > bound * (1.0 + 1e-12));
+        let turned = (normal - exact_normal).length() / 2f64.powi(-53);
+        self.normals.push(if turned.is_nan() { f64::INFINITY } else { turned });
 
-        let mut rng = Rng::new(i as u64);
+        let mut rng = Rng::new(seed);
         let away = exact_normal * rng.log(1e-3, 1.0) + rng.across(exact_normal);
-        out.spawned += 1;
-        out.rehits += usize::from(if shipped {
+        self.spawned += 1;
+        self.rehits += usize::from(if shipped {
             let ray = Surface::new(shape.as_ref(), &case.ray, &hit).spawn(away);
             shape.intersect(&ray, Interval::FORWARD).is_some_and(|again| is_rehit(&case.solid, &hit, &again))
         } else {
-            let ray = Ray { origin: point, direction: away };
-            answer(entry.function, &ray, &case.solid).is_some_and(|again| is_rehit(&case.solid, &hit, &again))
+            let again = Case { ray: Ray { origin: point, direction: away }, within: Interval::FORWARD, ..case.clone() };
+            entry.answer(&again).flatten().is_some_and(|again| is_rehit(&case.solid, &hit, &again))
         });
     }
-    out.points.sort_by(f64::total_cmp);
-    out.normals.sort_by(f64::total_cmp);
-    out
+}
+
+/// o + λd in the kernel's own precision.
+fn textbook_point(origin: Origin, ray: &Ray, hit: &Hit) -> DVec3 {
+    if origin == Origin::TextbookF32 {
+        return (ray.origin.as_vec3() + ray.direction.as_vec3() * hit.lambda as f32).as_dvec3();
+    }
+    ray.at(hit.lambda)
 }
 
 /// Other triangles of a mesh may well be met; no other shape of these by a ray that leaves it.
@@ -129,12 +115,6 @@ fn is_rehit(solid: &Solid, hit: &Hit, again: &Hit) -> bool {
         Solid::Affine { inner, .. } => is_rehit(inner, hit, again),
         _ => true,
     }
-}
-
-fn answer(function: Function, ray: &Ray, solid: &Solid) -> Answer {
-    let case = Case { ray: *ray, within: Interval::FORWARD, solid: solid.clone() };
-    let entry = Entry { kernel: crate::kernels::kind(solid), name: "", origin: Origin::TextbookF64, function };
-    entry.answer(&case).flatten()
 }
 
 fn largest(solid: &Solid) -> f64 {
