@@ -4,7 +4,7 @@
 //! they say so.
 
 use super::slab::LocalRay;
-use super::wide::{LEAF, NONE, Wide, WideNode};
+use super::wide::{CHILDREN, LEAF, NONE, Wide, WideNode};
 use fearless_simd::{Simd, f32x8, prelude::*};
 
 /// What is left to visit: children, each with the t where its box begins. Kept in a fixed array; what does not fit,
@@ -166,18 +166,18 @@ pub(crate) fn closest<S: Simd>(
                 at = NONE;
                 break;
             }
-            let enter: [f32; 8] = enter.into();
+            let (enter, child): ([f32; 8], [f32; 8]) = (enter.into(), node.row(simd, CHILDREN as u32).into());
+            let child = |lane: usize| child[lane & 7].to_bits();
             let first = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
             if hits == 0 {
-                at = node.child(first);
+                at = child(first);
                 continue;
             }
             stack.reserve();
             let second = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
-            let (a, b) =
-                (Stack::entry(node.child(first), enter[first]), Stack::entry(node.child(second), enter[second]));
+            let (a, b) = (Stack::entry(child(first), enter[first]), Stack::entry(child(second), enter[second]));
             let (nearer, farther) = if a < b { (a, b) } else { (b, a) };
             stack.push(farther);
             if hits == 0 {
@@ -189,7 +189,7 @@ pub(crate) fn closest<S: Simd>(
             while hits != 0 {
                 let i = hits.trailing_zeros() as usize & 7;
                 hits &= hits - 1;
-                stack.insert(Stack::entry(node.child(i), enter[i]), count);
+                stack.insert(Stack::entry(child(i), enter[i]), count);
                 count += 1;
             }
             let Some((child, _)) = stack.pop() else { return };
@@ -218,11 +218,13 @@ pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, beam: &impl Beam<S>, t_max: f32
         while at & LEAF == 0 {
             let node = &nodes[at as usize];
             let (mut hits, _) = beam.test(simd, node, t_max);
+            let child: [f32; 8] = node.row(simd, CHILDREN as u32).into();
+            let child = |lane: usize| child[lane & 7].to_bits();
             if hits == 0 {
                 at = NONE;
                 break;
             }
-            at = node.child(hits.trailing_zeros() as usize);
+            at = child(hits.trailing_zeros() as usize);
             hits &= hits - 1;
             if hits != 0 {
                 stack.reserve();
@@ -230,7 +232,7 @@ pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, beam: &impl Beam<S>, t_max: f32
             while hits != 0 {
                 let i = hits.ilog2();
                 hits &= !(1 << i);
-                stack.push(u64::from(node.child(i as usize)));
+                stack.push(u64::from(child(i as usize)));
             }
         }
         if at != NONE && leaves.leaf(simd, at & !LEAF) {

@@ -131,8 +131,10 @@ pub(super) struct Margins {
     /// Of the edge functions: size·(`edge` + size·`edge2`).
     edge: f32,
     edge2: f32,
-    /// Of t's numerator against its denominator: size²·`depth`.
-    depth: f32,
+    /// Of t's numerator for the place of v₀ − o: |n|·`place`, and size²·`place` times a few ε once more.
+    place: f32,
+    /// Of t's denominator: size²·`det`.
+    det: f32,
 }
 
 /// The longest way to a triangle along one axis, from an origin with the largest coordinate `size`; its error as if it
@@ -234,13 +236,16 @@ pub(super) fn filter<S: Simd>(
     // Certainly through: all three above zero, or all below.
     let through = least.simd_gt(margin) | most.simd_lt(-margin);
 
-    // The sign of det goes to t's numerator; where it is uncertain the margin is wide enough for both.
+    // The sign of det goes to t's numerator. Where it is uncertain the far margin is wide enough for both, and nothing is
+    // said to lie before t_min.
     let t = dot(n, c);
-    let depth = (size * size).mul_add(splat(simd, margins.depth), splat(simd, UNDERFLOW));
     let size_of_det = det.abs();
     let signed = t * splat(simd, 1.0).copysign(det);
+    let (of_t, of_det) = margins.depth(simd, size, c, n);
+    let depth = of_det.mul_add(t_min.abs().max(last.abs()), of_t);
     let beyond = (signed - size_of_det * last).simd_gt(depth);
-    let before = (signed - size_of_det * t_min).simd_lt(-depth);
+    let near = of_det.mul_add(t_min.abs(), of_t);
+    let before = (signed - size_of_det * t_min).simd_lt(-near) & size_of_det.simd_gt(of_det);
     let maybe = !(outside | (beyond | before).to_bitmask() as u32) & 0xff;
     if maybe == 0 {
         return None;
@@ -255,12 +260,21 @@ impl Margins {
     fn new(steps: f32, length: f32) -> Self {
         // |direction| ≤ √3·length, |v₀ − o| ≤ √3·steps
         let (d, r) = (1.7321 * length, 1.7321 * steps);
-        Self { edge: 13.0 * E * d * r, edge2: 3.1 * E * d, depth: 6.2 * E * r }
+        Self { edge: 13.0 * E * d * r, edge2: 3.1 * E * d, place: E * steps, det: 2.75 * E * d }
     }
 
     #[inline(always)]
     fn edges<S: Simd>(&self, simd: S, size: f32x8<S>) -> f32x8<S> {
         size.mul_add(size.mul_add(splat(simd, self.edge2), splat(simd, self.edge)), splat(simd, UNDERFLOW))
+    }
+
+    /// What t's numerator n·c and its denominator may be off by.
+    #[inline(always)]
+    fn depth<S: Simd>(&self, simd: S, size: f32x8<S>, c: Vec8<S>, n: Vec8<S>) -> (f32x8<S>, f32x8<S>) {
+        let square = size * size;
+        let of_c = taxicab(c).mul_add(splat(simd, 2.5 * E), splat(simd, 16.0 * E * self.place));
+        let of_t = taxicab(n).mul_add(splat(simd, self.place), square.mul_add(of_c, splat(simd, UNDERFLOW)));
+        (of_t, square * splat(simd, self.det))
     }
 }
 
@@ -389,6 +403,12 @@ fn three<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> Vec8<S> {
 #[inline(always)]
 fn absolute<S: Simd>(a: Vec8<S>) -> Vec8<S> {
     [a[0].abs(), a[1].abs(), a[2].abs()]
+}
+
+/// The sum of the components' sizes.
+#[inline(always)]
+fn taxicab<S: Simd>(a: Vec8<S>) -> f32x8<S> {
+    a[0].abs() + a[1].abs() + a[2].abs()
 }
 
 #[inline(always)]

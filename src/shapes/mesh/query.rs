@@ -12,7 +12,29 @@ use std::cmp::Ordering;
 
 /// The nearest hit; the lowest triangle of those met at exactly the same λ.
 pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
-    dispatch!(mesh.level.token(), simd => closest_with(simd, mesh, ray, within))
+    let asked = Asked::new(ray, within);
+    dispatch!(mesh.level.token(), simd => closest_with(simd, mesh, asked.ray, asked.within()))
+}
+
+/// A query on its way into a dispatched function, which takes it through memory. The limits do not stand side by side: they
+/// would be stored one by one and loaded as a pair, which has to wait until both have reached the cache.
+#[repr(C)]
+struct Asked<'a> {
+    min: f64,
+    ray: &'a Ray,
+    max: f64,
+}
+
+impl<'a> Asked<'a> {
+    #[inline(always)]
+    fn new(ray: &'a Ray, Interval { min, max }: Interval) -> Self {
+        Self { min, ray, max }
+    }
+
+    #[inline(always)]
+    fn within(&self) -> Interval {
+        Interval { min: self.min, max: self.max }
+    }
 }
 
 #[inline(always)]
@@ -28,7 +50,8 @@ fn closest_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> O
 
 /// Whether anything is hit.
 pub(super) fn any(mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
-    dispatch!(mesh.level.token(), simd => any_with(simd, mesh, ray, within))
+    let asked = Asked::new(ray, within);
+    dispatch!(mesh.level.token(), simd => any_with(simd, mesh, asked.ray, asked.within()))
 }
 
 #[inline(always)]
