@@ -42,7 +42,10 @@ fn flat_kernels(criterion: &mut Criterion) {
     for (name, distance, spread) in [("ordinary", 5.0, 1.0), ("all hit", 5.0, 0.5), ("from 1e6", 1e6, 1.0)] {
         let cases = triangles(distance, spread);
         let mut group = criterion.benchmark_group(format!("triangle, {name}"));
+        each(&mut group, "Algorithm 1", &cases, |(ray, t)| textbook::algorithm_1::<f64>(ray, t, FORWARD));
+        each(&mut group, "Algorithm 2", &cases, |(ray, t)| textbook::algorithm_2::<f64>(ray, t, FORWARD));
         each(&mut group, "Möller–Trumbore", &cases, |(ray, t)| textbook::moller_trumbore::<f64>(ray, t, FORWARD));
+        each(&mut group, "Woop", &cases, |(ray, t)| textbook::woop::<f64>(ray, t, FORWARD));
         each(&mut group, "shipped", &cases, |(ray, t)| triangle::intersect(ray, t, FORWARD));
     }
     let mut r = Rng::new(2);
@@ -97,6 +100,12 @@ fn flat_kernels(criterion: &mut Criterion) {
         .collect();
     let mut group = criterion.benchmark_group("affine triangle");
     each(&mut group, "itself", &placed, |(ray, _, _, triangle)| triangle.intersect(ray, FORWARD));
+    let inverse = map.inverse();
+    each(&mut group, "Möller–Trumbore, mapped ray", &placed, |(_, world, _, triangle)| {
+        let origin = inverse.transform_point3(world.origin);
+        let ray = Ray::new(origin, inverse.transform_vector3(world.direction));
+        textbook::moller_trumbore::<f64>(&ray, triangle.vertices(), FORWARD)
+    });
     each(&mut group, "through a map", &placed, |(_, world, affine, _)| affine.intersect(world, FORWARD));
     group.finish();
 }

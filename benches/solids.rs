@@ -83,6 +83,9 @@ fn spheres(criterion: &mut Criterion) {
         each(&mut group, "textbook", &cases, 0.0..1.1, |b| {
             textbook::sphere::<f64>(&b.ray, b.center, b.radius, FORWARD)
         });
+        each(&mut group, "Ray Tracing Gems 7", &cases, 0.0..1.1, |b| {
+            textbook::sphere_gems::<f64>(&b.ray, b.center, b.radius, FORWARD)
+        });
         each(&mut group, "shipped", &cases, hits, |b| sphere::intersect(&b.ray, b.center, b.radius, FORWARD));
     }
 }

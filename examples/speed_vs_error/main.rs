@@ -17,6 +17,7 @@ mod page;
 mod peers;
 mod pictures;
 mod plots;
+mod readme;
 mod rows;
 mod svg;
 mod sweeps;
@@ -124,7 +125,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         save("error-grazing.svg", &|| plots::grazing(&entries, n))?;
         save("error-cdf.svg", &|| plots::cdf(&rows, &shown))?;
         save("tightness.svg", &|| plots::tightness(&rows, &bounded))?;
-        save("wrong-by-scale.svg", &|| plots::heat(&entries, n / 2))?;
+        save("wrong-by-scale.svg", &|| plots::heat(&entries, n))?;
         bar.set_message("far-view.png");
         pictures::far_view(&out.join("pictures/far-view.png"))?;
         bar.inc(1);
@@ -146,6 +147,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     if kept && !options.full {
         std::fs::write("tests/worst-cases.txt", tables::worst_cases(&rows))?;
+        readme::update(&page)?;
     }
     std::fs::write(out.join("speed-vs-error.csv"), csv)?;
     std::fs::write(out.join("speed-vs-error.md"), page.markdown())?;

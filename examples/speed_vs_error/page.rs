@@ -62,17 +62,17 @@ pub fn machine() -> String {
 }
 
 /// All families of one kernel, summed.
-struct Sum {
-    cases: usize,
-    wrong: usize,
-    edges: usize,
-    parts: usize,
-    hits: usize,
-    violations: usize,
-    refined: usize,
-    ulps: Vec<f64>,
-    ordinary: Option<(f64, f64)>,
-    hard: f64,
+pub struct Sum {
+    pub cases: usize,
+    pub wrong: usize,
+    pub edges: usize,
+    pub parts: usize,
+    pub hits: usize,
+    pub violations: usize,
+    pub refined: usize,
+    pub ulps: Vec<f64>,
+    pub ordinary: Option<(f64, f64)>,
+    pub hard: f64,
 }
 
 impl Page<'_> {
@@ -90,7 +90,7 @@ impl Page<'_> {
         self.rows.iter().filter(move |r| r.entry.kernel == kernel && r.number == number && !r.is_shipped())
     }
 
-    fn sum(&self, kernel: Kernel, name: &str) -> Sum {
+    pub fn sum(&self, kernel: Kernel, name: &str) -> Sum {
         let rows = || self.of(kernel, name);
         let mut all: Vec<f64> = rows().flat_map(|r| r.accuracy.ulps.iter().copied()).collect();
         all.sort_by(f64::total_cmp);

@@ -4,7 +4,7 @@ use crate::kernels::{Entry, Origin};
 use crate::rows::{Row, Sheet};
 use crate::support::cases::{Case, Kernel};
 use crate::support::oracle;
-use crate::svg::{Axis, COLOURS, Panel, Svg, legend, power_of_ten};
+use crate::svg::{Axis, COLOURS, Mark, Panel, Svg, legend, power_of_ten};
 use crate::sweeps;
 
 fn colour(origin: Origin) -> &'static str {
@@ -12,6 +12,31 @@ fn colour(origin: Origin) -> &'static str {
         Origin::TextbookF32 => COLOURS[0],
         Origin::TextbookF64 => COLOURS[1],
         Origin::Shipped => COLOURS[2],
+    }
+}
+
+fn mark(origin: Origin) -> Mark {
+    match origin {
+        Origin::TextbookF32 => Mark::Square,
+        Origin::TextbookF64 => Mark::Circle,
+        Origin::Shipped => Mark::Diamond,
+    }
+}
+
+/// The origins' names, and what else there is to say.
+fn key<'a>(more: &[(&'a str, Mark, &'a str, bool)]) -> Vec<(&'a str, Mark, &'a str, bool)> {
+    let origins =
+        [("textbook f32", Origin::TextbookF32), ("textbook f64", Origin::TextbookF64), ("truehit", Origin::Shipped)];
+    origins.iter().map(|(name, o)| (*name, mark(*o), colour(*o), true)).chain(more.iter().copied()).collect()
+}
+
+/// How the textbook's kernels of one shape are told apart.
+fn dash(name: &str) -> &'static str {
+    match name.split(" f").next() {
+        Some("Algorithm 1") => "8 3",
+        Some("Algorithm 2") => "2 3",
+        Some("Woop" | "RT Gems 7") => "5 3",
+        _ => "",
     }
 }
 
@@ -23,23 +48,17 @@ pub fn pareto(rows: &[Row], kernels: &[Kernel]) -> String {
     let width = 20.0 + columns as f64 * (w + 62.0);
     let mut svg = Svg::new(
         width,
-        70.0 + lines as f64 * (h + 70.0),
+        62.0 + lines as f64 * (h + 62.0),
         "Speed against error: each point a kernel on a family of rays",
     );
-    legend(
-        &mut svg,
-        60.0,
-        42.0,
-        &[
-            ("textbook f32", COLOURS[0], true),
-            ("textbook f64", COLOURS[1], true),
-            ("truehit", COLOURS[2], true),
-            ("hollow: some hits or misses are wrong", COLOURS[5], false),
-            ("line: the front of those that are never wrong; below ¼ ulp: exact", COLOURS[3], true),
-        ],
-    );
+    let front = "line: the front of those never wrong (lowest points: exact)";
+    let more = [
+        ("hollow: some hits or misses are wrong", Mark::Circle, COLOURS[5], false),
+        (front, Mark::Circle, COLOURS[3], true),
+    ];
+    legend(&mut svg, 60.0, 42.0, &key(&more));
     for (i, &kernel) in kernels.iter().enumerate() {
-        let at = (56.0 + (i % columns) as f64 * (w + 62.0), 76.0 + (i / columns) as f64 * (h + 70.0));
+        let at = (56.0 + (i % columns) as f64 * (w + 62.0), 76.0 + (i / columns) as f64 * (h + 62.0));
         let points: Vec<(&Row, f64, f64)> = rows
             .iter()
             .filter(|r| r.entry.kernel == kernel && !r.accuracy.ulps.is_empty())
@@ -55,7 +74,8 @@ pub fn pareto(rows: &[Row], kernels: &[Kernel]) -> String {
                 row.family,
                 row.accuracy.wrong()
             );
-            svg.dot(panel.at(*ns, *ulp), 3.2, colour(row.entry.origin), row.accuracy.wrong() == 0, &hint);
+            let origin = row.entry.origin;
+            svg.mark(panel.at(*ns, *ulp), mark(origin), colour(origin), row.accuracy.wrong() == 0, &hint);
         }
         // Nothing on the front is both slower and less exact than another point; a wrong decision keeps off it.
         let mut right: Vec<_> = points.iter().filter(|p| p.0.accuracy.wrong() == 0).map(|p| (p.1, p.2)).collect();
@@ -85,24 +105,22 @@ fn curves(svg: &mut Svg, panel: &Panel, entries: &[Entry], values: &[f64], n: u6
         let truths: Vec<_> = cases.iter().map(oracle::truth).collect();
         for (entry, line) in entries.iter().zip(&mut lines) {
             let point = sweeps::point(entry, &cases, &truths);
-            if point.max.is_nan() {
+            // Of a few hits the largest error says little.
+            if 4 * point.hits < truths.iter().flatten().count() {
+                line.push((f64::NAN, f64::NAN));
                 continue;
             }
             let at = panel.at(value, point.max.clamp(0.1, 1e20));
             // Hollow where some decision was wrong.
-            svg.dot(
-                at,
-                2.6,
-                colour(entry.origin),
-                point.wrong == 0.0,
-                &format!("{}: {:.1e} ulp", entry.name, point.max),
-            );
+            let hint = format!("{}: {:.1e} ulp", entry.name, point.max);
+            svg.mark(at, mark(entry.origin), colour(entry.origin), point.wrong == 0.0, &hint);
             line.push(at);
         }
     }
     for (entry, line) in entries.iter().zip(&lines) {
-        let dash = if entry.name.contains("Gems") || entry.name.contains("Woop") { "5 3" } else { "" };
-        svg.polyline(line, colour(entry.origin), dash);
+        for part in line.split(|p| p.0.is_nan()).filter(|p| p.len() > 1) {
+            svg.polyline(part, colour(entry.origin), dash(entry.name));
+        }
     }
 }
 
@@ -123,18 +141,9 @@ fn sweep_plot(
     make: impl Fn(Kernel, f64, u64) -> Case,
 ) -> String {
     let (w, h) = (230.0, 200.0);
-    let mut svg = Svg::new(20.0 + kernels.len() as f64 * (w + 66.0), 330.0, title);
-    legend(
-        &mut svg,
-        60.0,
-        42.0,
-        &[
-            ("textbook f32", COLOURS[0], true),
-            ("textbook f64", COLOURS[1], true),
-            ("truehit", COLOURS[2], true),
-            ("hollow: wrong decisions; dashed: RT Gems 7, Woop", COLOURS[5], false),
-        ],
-    );
+    let mut svg = Svg::new(20.0 + kernels.len() as f64 * (w + 66.0), 316.0, title);
+    let more = "hollow: wrong decisions; none: most hits missed; dashed: RT Gems 7, Woop";
+    legend(&mut svg, 60.0, 42.0, &key(&[(more, Mark::Circle, COLOURS[5], false)]));
     for (i, &kernel) in kernels.iter().enumerate() {
         let at = (60.0 + i as f64 * (w + 66.0), 76.0);
         let x = Axis::decades(label, values[0], values[values.len() - 1]);
@@ -170,17 +179,19 @@ pub fn cdf(rows: &[Row], kernels: &[Kernel]) -> String {
     let lines = kernels.len().div_ceil(columns);
     let mut svg = Svg::new(
         20.0 + columns as f64 * (w + 62.0),
-        70.0 + lines as f64 * (h + 70.0),
+        62.0 + lines as f64 * (h + 62.0),
         "λ error over all families: the share of hits that are at most so far off",
     );
-    legend(
-        &mut svg,
-        60.0,
+    legend(&mut svg, 60.0, 42.0, &key(&[]));
+    svg.text(
+        330.0,
         42.0,
-        &[("textbook f32", COLOURS[0], true), ("textbook f64", COLOURS[1], true), ("truehit", COLOURS[2], true)],
+        "dashed: RT Gems 7, Woop; long dashes: Algorithm 1; dots: Algorithm 2; at the left edge: exact",
+        "start",
+        "",
     );
     for (i, &kernel) in kernels.iter().enumerate() {
-        let at = (56.0 + (i % columns) as f64 * (w + 62.0), 76.0 + (i / columns) as f64 * (h + 70.0));
+        let at = (56.0 + (i % columns) as f64 * (w + 62.0), 76.0 + (i / columns) as f64 * (h + 62.0));
         let x = Axis::decades("λ error, ulp", 1e-3, 1e20);
         let y = Axis::linear("share of hits", 0.0, 1.0);
         let panel = Panel::draw(&mut svg, at, (w, h), kernel.name(), x, y);
@@ -202,7 +213,7 @@ pub fn cdf(rows: &[Row], kernels: &[Kernel]) -> String {
                     panel.at(crate::rows::quantile(&ulps, q).unwrap_or(0.0).clamp(1e-3, 1e20), q)
                 })
                 .collect();
-            svg.polyline(&points, colour(origin), "");
+            svg.polyline(&points, colour(origin), dash(name));
         }
     }
     svg.finish()
@@ -215,11 +226,11 @@ pub fn tightness(rows: &[Row], kernels: &[Kernel]) -> String {
     let lines = kernels.len().div_ceil(columns);
     let mut svg = Svg::new(
         20.0 + columns as f64 * (w + 62.0),
-        50.0 + lines as f64 * (h + 70.0),
+        40.0 + lines as f64 * (h + 64.0),
         "Tightness: the bound of a hit over its error (left of 1 it would not hold)",
     );
     for (i, &kernel) in kernels.iter().enumerate() {
-        let at = (56.0 + (i % columns) as f64 * (w + 62.0), 56.0 + (i / columns) as f64 * (h + 70.0));
+        let at = (56.0 + (i % columns) as f64 * (w + 62.0), 56.0 + (i / columns) as f64 * (h + 64.0));
         let all: Vec<f64> = rows
             .iter()
             .filter(|r| r.entry.kernel == kernel && r.entry.origin == Origin::Shipped)
@@ -286,16 +297,12 @@ pub fn heat(entries: &[Entry], n: u64) -> String {
             })
             .collect();
         for (column, entry) in shown.iter().enumerate() {
-            let (left, top) = (60.0 + column as f64 * 236.0, 62.0 + line as f64 * 240.0);
+            let (left, top) = (70.0 + column as f64 * 236.0, 62.0 + line as f64 * 240.0);
             svg.text(left + cell * 6.5, top - 8.0, &format!("{}: {}", kernel.name(), entry.name), "middle", "");
             for (j, row) in grid.iter().enumerate() {
                 for (i, sheet) in row.iter().enumerate() {
                     let wrong = sweeps::point(entry, &sheet.cases, &sheet.truths).wrong;
-                    let (x, y) = (left + i as f64 * cell, top + (12 - j) as f64 * cell);
-                    svg.rectangle(x, y, cell - 1.0, cell - 1.0, COLOURS[3], if wrong == 0.0 { 0.35 } else { 0.0 });
-                    if wrong > 0.0 {
-                        svg.rectangle(x, y, cell - 1.0, cell - 1.0, COLOURS[0], 0.25 + 0.75 * wrong.sqrt());
-                    }
+                    shade(&mut svg, (left + i as f64 * cell, top + (12 - j) as f64 * cell), cell - 1.0, wrong);
                 }
             }
             for (i, &d) in distances.iter().enumerate().step_by(3) {
@@ -304,15 +311,25 @@ pub fn heat(entries: &[Entry], n: u64) -> String {
             for (j, &s) in scales.iter().enumerate().step_by(3) {
                 svg.text(left - 5.0, top + (12.5 - j as f64) * cell + 3.0, &power_of_ten(s), "end", "small");
             }
-            svg.text(left + cell * 6.5, top + 13.0 * cell + 27.0, "distance / size (up: size)", "middle", "small");
+            svg.text(left + cell * 6.5, top + 13.0 * cell + 27.0, "distance / size", "middle", "small");
+            svg.upright((left - 40.0, top + cell * 6.5), "size, units of length");
         }
     }
-    svg.text(
-        60.0,
-        545.0,
-        "Green: none wrong. Red: some, the stronger the more (a tenth is a third of the way).",
-        "start",
-        "",
-    );
+    let mut x = 70.0;
+    for (wrong, label) in [(0.0, "none wrong"), (0.01, "1 %"), (0.1, "10 %"), (0.5, "50 %"), (1.0, "all wrong")] {
+        shade(&mut svg, (x, 534.0), cell - 1.0, wrong);
+        svg.text(x + 18.0, 545.0, label, "start", "");
+        x += 40.0 + 6.5 * label.len() as f64;
+    }
+    svg.text(x, 545.0, &format!("of {n} rays at or beside the shape, a cell"), "start", "");
     svg.finish()
+}
+
+/// A cell of a heat map by the share that is wrong.
+fn shade(svg: &mut Svg, (x, y): (f64, f64), size: f64, wrong: f64) {
+    if wrong == 0.0 {
+        svg.rectangle(x, y, size, size, COLOURS[2], 0.45);
+    } else {
+        svg.rectangle(x, y, size, size, COLOURS[0], 0.3 + 0.7 * wrong.sqrt());
+    }
 }

@@ -3,7 +3,15 @@
 use std::fmt::Write;
 
 /// Colours that keep their contrast on both grounds, by role.
-pub const COLOURS: [&str; 6] = ["#d1495b", "#e08e2b", "#2e86ab", "#3fa34d", "#8e6cc0", "#7a7f87"];
+pub const COLOURS: [&str; 6] = ["#d1495b", "#c97b12", "#2e86ab", "#3fa34d", "#8e6cc0", "#7a7f87"];
+
+/// Told apart without their colours, too.
+#[derive(Clone, Copy, Debug)]
+pub enum Mark {
+    Square,
+    Circle,
+    Diamond,
+}
 
 pub struct Svg {
     width: f64,
@@ -24,6 +32,14 @@ impl Svg {
             writeln!(self.body, r#"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" class="{class}">{text}</text>"#);
     }
 
+    /// Small, from below upwards, about a point.
+    pub fn upright(&mut self, (x, y): (f64, f64), text: &str) {
+        let _ = writeln!(
+            self.body,
+            r#"<text x="{x:.1}" y="{y:.1}" text-anchor="middle" class="small" transform="rotate(-90 {x:.1} {y:.1})">{text}</text>"#,
+        );
+    }
+
     pub fn line(&mut self, a: (f64, f64), b: (f64, f64), class: &str) {
         let ((x1, y1), (x2, y2)) = (a, b);
         let _ = writeln!(self.body, r#"<path d="M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}" class="{class}"/>"#);
@@ -41,12 +57,24 @@ impl Svg {
     }
 
     /// Filled, or only its outline.
-    pub fn dot(&mut self, (x, y): (f64, f64), r: f64, colour: &str, filled: bool, hint: &str) {
+    pub fn mark(&mut self, (x, y): (f64, f64), shape: Mark, colour: &str, filled: bool, hint: &str) {
         let fill = if filled { colour } else { "none" };
         let hint = hint.replace('&', "&amp;").replace('<', "&lt;");
+        let r = 3.0;
+        let path = match shape {
+            Mark::Square => {
+                let r = 0.9 * r;
+                format!("M{:.1} {:.1}h{}v{}h-{}z", x - r, y - r, 2.0 * r, 2.0 * r, 2.0 * r)
+            }
+            Mark::Circle => format!("M{:.1} {y:.1}a{r} {r} 0 1 0 {} 0a{r} {r} 0 1 0 -{} 0z", x - r, 2.0 * r, 2.0 * r),
+            Mark::Diamond => {
+                let r = 1.35 * r;
+                format!("M{x:.1} {:.1}l{r:.2} {r:.2}l-{r:.2} {r:.2}l-{r:.2} -{r:.2}z", y - r)
+            }
+        };
         let _ = writeln!(
             self.body,
-            r#"<circle cx="{x:.1}" cy="{y:.1}" r="{r}" fill="{fill}" fill-opacity=".75" stroke="{colour}"><title>{hint}</title></circle>"#
+            r#"<path d="{path}" fill="{fill}" fill-opacity=".7" stroke="{colour}"><title>{hint}</title></path>"#
         );
     }
 
@@ -162,12 +190,8 @@ impl Panel {
         svg.line((panel.left, bottom), (right, bottom), "axis");
         svg.text(panel.left + panel.width / 2.0, panel.top - 7.0, title, "middle", "");
         svg.text(panel.left + panel.width / 2.0, bottom + 27.0, &panel.x.label.clone(), "middle", "small");
-        let (x, y) = (panel.left - 36.0, panel.top + panel.height / 2.0);
-        let _ = writeln!(
-            svg.body,
-            r#"<text x="{x:.1}" y="{y:.1}" text-anchor="middle" class="small" transform="rotate(-90 {x:.1} {y:.1})">{}</text>"#,
-            panel.y.label
-        );
+        let at = (panel.left - 36.0, panel.top + panel.height / 2.0);
+        svg.upright(at, &panel.y.label);
         panel
     }
 
@@ -179,11 +203,11 @@ impl Panel {
     }
 }
 
-/// Names beside their colours, in one row.
-pub fn legend(svg: &mut Svg, mut x: f64, y: f64, entries: &[(&str, &str, bool)]) {
-    for &(name, colour, filled) in entries {
-        svg.dot((x, y - 4.0), 4.0, colour, filled, name);
+/// Names beside their marks, in one row.
+pub fn legend(svg: &mut Svg, mut x: f64, y: f64, entries: &[(&str, Mark, &str, bool)]) {
+    for &(name, mark, colour, filled) in entries {
+        svg.mark((x, y - 4.0), mark, colour, filled, name);
         svg.text(x + 8.0, y, name, "start", "");
-        x += 22.0 + 6.3 * name.chars().count() as f64;
+        x += 24.0 + 6.0 * name.chars().count() as f64;
     }
 }

@@ -79,8 +79,9 @@ pub fn at_angle(kernel: Kernel, angle: f64, seed: u64) -> Case {
     }
 }
 
-/// The largest error of the hits that are hits in ulps, NaN without any; and the share of wrong decisions.
+/// The hits that are hits, the largest error among them in ulps, and the share of wrong decisions.
 pub struct Point {
+    pub hits: usize,
     pub max: f64,
     pub wrong: f64,
 }
@@ -98,6 +99,7 @@ pub fn point(entry: &Entry, cases: &[Case], truths: &[Option<oracle::Truth>]) ->
             _ => wrong += 1,
         }
     }
+    let hits = ulps.len();
     let max = ulps.into_iter().reduce(f64::max).unwrap_or(f64::NAN);
-    Point { max, wrong: f64::from(wrong) / cases.len() as f64 }
+    Point { hits, max, wrong: f64::from(wrong) / cases.len() as f64 }
 }

@@ -124,8 +124,8 @@ pub fn csv(provenance: &str, rows: &[Row]) -> String {
     let ends: Vec<String> = BINS.iter().map(|b| format!("ulp <= {b}")).collect();
     let mut out = format!(
         "# {provenance}\n{COLUMNS},ulp p50,ulp p99,ulp max,{},ulp above,coordinate ulp max,bound/error p50,\
-         ns,ns low quartile,ns high quartile,ns chained,ns chained low quartile,ns chained high quartile,\
-         points,point ulp p50,point ulp max,point bounds broken,normal p50,normal max,spawned,re-hits\n",
+         points,point ulp p50,point ulp max,point bounds broken,normal p50,normal max,spawned,re-hits,\
+         ns,ns low quartile,ns high quartile,ns chained,ns chained low quartile,ns chained high quartile\n",
         ends.join(",")
     );
     let number = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.4e}"));
@@ -156,10 +156,10 @@ pub fn csv(provenance: &str, rows: &[Row]) -> String {
         cells.extend([number(a.quantile(0.5)), number(a.quantile(0.99)), number(a.max())]);
         cells.extend(a.histogram().map(|c| c.to_string()));
         cells.extend([format!("{:.4e}", a.coordinate_ulps), number(quantile(&a.tightness, 0.5))]);
-        cells.extend([t.median, t.low, t.high, l.median, l.low, l.high].map(|x| format!("{x:.2}")));
         cells.extend([f.points.len().to_string(), number(quantile(&f.points, 0.5)), number(f.points.last().copied())]);
         cells.extend([f.violations.to_string(), number(quantile(&f.normals, 0.5)), number(f.normals.last().copied())]);
         cells.extend([f.spawned.to_string(), f.rehits.to_string()]);
+        cells.extend([t.median, t.low, t.high, l.median, l.low, l.high].map(|x| format!("{x:.2}")));
         let _ = writeln!(out, "{}", cells.join(","));
     }
     out

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 const SETS: [&str; 6] = ["primary", "bounce", "random", "shadow", "bounce any", "random any"];
 
-/// CPU, compiler flags, commit: what a figure means nothing without.
+/// Date, CPU, compiler flags, commit: what a figure means nothing without.
 pub fn machine(embree: Option<String>) -> String {
     let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let cpu = cpu.lines().find_map(|l| l.strip_prefix("model name")?.split_once(": ")).map_or("CPU unknown", |m| m.1);
@@ -22,7 +22,8 @@ pub fn machine(embree: Option<String>) -> String {
         .collect();
     let built = if cfg!(target_feature = "avx2") { "native build" } else { "baseline build" };
     format!(
-        "{cpu} ({}); {rustc}, {built}; truehit {}; {}; one thread, CPU time.",
+        "{}: {cpu} ({}); {rustc}, {built}; truehit {}; {}; one thread, CPU time.",
+        output("date", &["-u", "+%F"]).unwrap_or_else(|| "no date".to_owned()),
         simd.join(", "),
         commit.unwrap_or_default(),
         embree.unwrap_or_else(|| "no Embree".to_owned()),
