@@ -44,7 +44,7 @@ fn kernels(page: &Page) -> String {
         let time = |s: &crate::page::Sum| s.ordinary.map_or("–".to_owned(), |t| ns(t.0.round()).replace(".0", ""));
         let wrong = |s: &crate::page::Sum| {
             let rate = (1e6 * s.wrong as f64 / s.cases as f64).round() as u64;
-            thousands(if rate >= 10_000 { rate / 1000 * 1000 } else { rate })
+            thousands(if rate >= 10_000 { (rate + 500) / 1000 * 1000 } else { rate })
         };
         let _ = writeln!(
             out,
