@@ -4,6 +4,7 @@ use crate::kernel::bound::{INFLATE, U};
 use crate::kernel::eft::{Split, two_diff, two_sum};
 use crate::kernel::float::{exponent_of, ldexp, power, unit};
 use crate::kernel::map::{Image, Map, Unusable, inverse, sum, taxicab};
+use crate::kernel::tally;
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -203,6 +204,7 @@ impl<S: Shape> Affine<S> {
     #[cold]
     #[inline(never)]
     fn next_to_limit(&self, image: &Image, within: Interval) -> Option<Hit> {
+        tally::refined();
         let mut zone = widened(image, within);
         loop {
             let hit = self.innermost().intersect(&image.ray, zone)?;

@@ -86,6 +86,17 @@ fn a_bound_too_small_shows() {
 }
 
 #[test]
+fn a_bound_too_large_shows() {
+    fn timid(ray: &Ray, center: DVec3, radius: f64, within: Interval) -> Option<Hit> {
+        let hit = sphere::intersect(ray, center, radius, within)?;
+        Some(Hit { error: hit.error * 100.0, ..hit })
+    }
+    let row = Row::new(&on_spheres(timid), &family(Kernel::Sphere, 0), &sheet(Kernel::Sphere, 0), 0);
+    let shortcomings = row.shortcomings();
+    assert!(shortcomings.len() == 1 && shortcomings[0].starts_with("bounds 1"), "{shortcomings:?}");
+}
+
+#[test]
 fn misses_and_inventions_are_counted_one_by_one() {
     fn odd(ray: &Ray) -> bool {
         ray.origin.x.to_bits().is_multiple_of(8)

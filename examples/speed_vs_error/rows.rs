@@ -39,6 +39,9 @@ pub const BINS: [f64; 6] = [0.0, 0.5, 1.0, 4.0, 1e3, 1e6];
 /// How many of the worst cases are kept.
 pub const KEPT: usize = 10;
 
+/// On ordinary rays the median bound is to be less than so many times the error.
+const TIGHT: f64 = 8.0;
+
 /// Counts and errors of one kernel on one family.
 #[derive(Clone, Default)]
 pub struct Accuracy {
@@ -246,6 +249,9 @@ impl Row {
             count(a.violations, "bounds on λ broken", a.hits);
             count(f.violations, "bounds on points broken", f.points.len());
             count(f.rehits, "re-hits", f.spawned);
+        }
+        if let Some(tight) = quantile(&a.tightness, 0.5).filter(|t| self.number == 0 && *t >= TIGHT) {
+            parts.push(format!("bounds {tight:.1} times the error, in the median"));
         }
         if let Some(most) = a.max().filter(|m| *m > self.contract) {
             parts.push(format!("λ off by {most:.3e} ulp"));
