@@ -79,11 +79,11 @@ fn spheres(criterion: &mut Criterion) {
         ("exact tangents", tangents, 0.6..1.1),
     ] {
         let mut group = criterion.benchmark_group(format!("sphere, {name}"));
-        // The textbook's own hit rate is what it is.
-        each(&mut group, "textbook", &cases, 0.0..1.1, |b| {
+        // What the textbook makes of grazing rays differs, but some hit.
+        each(&mut group, "textbook", &cases, 0.2..1.1, |b| {
             textbook::sphere::<f64>(&b.ray, b.center, b.radius, FORWARD)
         });
-        each(&mut group, "Ray Tracing Gems 7", &cases, 0.0..1.1, |b| {
+        each(&mut group, "Ray Tracing Gems 7", &cases, 0.2..1.1, |b| {
             textbook::sphere_gems::<f64>(&b.ray, b.center, b.radius, FORWARD)
         });
         each(&mut group, "shipped", &cases, hits, |b| sphere::intersect(&b.ray, b.center, b.radius, FORWARD));

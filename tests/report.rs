@@ -274,3 +274,34 @@ fn a_mesh_is_tight_and_crossed_once() {
     let crosses = sieves.iter().find(|s| s.name.contains("crosses")).unwrap();
     assert_eq!(crosses.doubles, Some([0; 3]));
 }
+
+/// Tables whose lines have as many cells as their heads: names of families hold bars.
+#[test]
+fn the_pages_tables_are_even() {
+    let (family, sheet) = (family(Kernel::Sphere, 16), Sheet::new(&family(Kernel::Sphere, 16), 40));
+    assert!(family.name.contains('|'));
+    let entries = [on_spheres(sphere::intersect), on_spheres(textbook::sphere::<f64>)];
+    let rows = entries.map(|e| Row::new(&e, &family, &sheet, 40));
+    let page = page::Page {
+        rows: &rows,
+        ordinary: &[],
+        sieves: &[],
+        cases: 40,
+        full: false,
+        machine: String::new(),
+        took: std::time::Duration::ZERO,
+    };
+    let committed = [include_str!("../docs/speed-vs-error.md"), include_str!("../README.md")];
+    let mut tables = 0;
+    for text in [page.markdown().as_str()].into_iter().chain(committed) {
+        let mut cells = 0;
+        for line in text.lines() {
+            let bars = if line.starts_with('|') { line.replace("\\|", "").matches('|').count() } else { 0 };
+            assert!(cells == 0 || bars == 0 || bars == cells, "{line}");
+            tables += usize::from(cells == 0 && bars > 0);
+            cells = bars;
+        }
+    }
+    println!("{tables} tables");
+    assert!(tables > 30);
+}

@@ -296,7 +296,7 @@ impl Page<'_> {
                 kernel.name(),
                 all[all.len() / 2].0,
                 row.number,
-                row.family,
+                cell(row.family),
                 quantile(&right, 0.5).map_or("–".to_owned(), |x| format!("{x:.2}")),
                 all.len(),
             );
