@@ -23,6 +23,7 @@ pub(crate) struct LocalRay {
     pub(crate) t_min: f32,
     /// Not below the t of `within.max`.
     pub(crate) t_max: f32,
+    pub(crate) sure: Sure,
     /// The origin, rounded.
     pub(crate) origin: [f32; 4],
     /// The direction, rounded.
@@ -104,13 +105,15 @@ impl LocalRay {
         let inv = gentle.select(f32x4::splat(simd, placed.steepest), one / direction);
         let pad = origin.abs().mul_add(f32x4::splat(simd, SLAB), f32x4::splat(simd, SLAB + 2.0 * placed.error));
         let (middle, half) = (origin * inv, inv.abs() * pad);
+        let [t_min, sure_max, sure_min, t_max] = placed.limits.of(simd, within);
         Some(Self {
             away: inv.simd_lt(0.0).to_bitmask() as u32,
             inv: inv.into(),
             near_shift: (-middle - half).into(),
             far_shift: (half - middle).into(),
-            t_min: placed.limits.lower(within.min),
-            t_max: placed.limits.upper(within.max),
+            t_min,
+            t_max,
+            sure: Sure { min: sure_min, max: sure_max },
             origin: origin.into(),
             direction: direction.into(),
             size: origin.abs().reduce_max(),
@@ -141,13 +144,50 @@ impl Limits {
     /// is far below the limit of 2¹⁰⁰, which keeps infinities out of the sums.
     #[inline(always)]
     fn upper_of(&self, lambda: f64, advance: f64) -> f32 {
-        const LIMIT: f64 = f64::from_bits((1023 + 100) << 52);
         let t = lambda * self.stretch;
-        let t = if t > LIMIT { LIMIT } else { t };
-        let t = if t < -LIMIT { -LIMIT } else { t };
+        let t = if t > FARTHEST_T { FARTHEST_T } else { t };
+        let t = if t < -FARTHEST_T { -FARTHEST_T } else { t };
         let slack = (t.abs() + advance.abs()) * f64::EPSILON + TINY;
         let t = t - advance;
-        ((t + slack) + t.abs() * (1.0 / f64::from(1 << 23))) as f32
+        ((t + slack) + t.abs() * NARROWING) as f32
+    }
+
+    /// The least t of `within.min` and `within.max`, and the greatest of both.
+    #[inline(always)]
+    fn of<S: Simd>(&self, simd: S, within: Interval) -> [f32; 4] {
+        let splat = |x: f64| f64x2::<S>::splat(simd, x);
+        let t = f64x2::<S>::simd_from(simd, [within.min, within.max]) * self.stretch;
+        let t = t.min(splat(FARTHEST_T)).max(splat(-FARTHEST_T));
+        let slack = (t.abs() + splat(self.advance.abs())) * f64::EPSILON + TINY;
+        let t = t - splat(self.advance);
+        let half = t.abs() * NARROWING + slack;
+        (t - half).relaxed_narrow(t + half).into()
+    }
+}
+
+/// Beyond this limits are all alike.
+const FARTHEST_T: f64 = power(100);
+
+/// Covers the rounding of a limit to f32, twice.
+const NARROWING: f64 = power(-23);
+
+/// What is certainly inside an interval: limits of t rounded inward.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sure {
+    min: f32,
+    max: f32,
+}
+
+impl Sure {
+    #[inline(always)]
+    pub(crate) fn new(limits: Limits, within: Interval) -> Self {
+        Self { min: limits.upper(within.min), max: limits.lower(within.max) }
+    }
+
+    /// Whether a t between these is inside for certain; not if one is NaN.
+    #[inline(always)]
+    pub(crate) fn holds(self, [low, high]: [f32; 2]) -> bool {
+        (low > self.min) & (high < self.max)
     }
 }
 

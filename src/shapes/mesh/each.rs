@@ -3,8 +3,8 @@
 
 use super::Mesh;
 use super::leaf::{Leaf, Outcome, Thick, Vec8, filter, load};
-use super::query::{self, Nearest, Sure, occluded};
-use crate::bvh::{self, Bundle, Eight, Limits, RAYS};
+use super::query::{self, Nearest, occluded};
+use crate::bvh::{self, Bundle, Eight, Limits, RAYS, Sure};
 use crate::{Hit, Interval, Ray};
 use fearless_simd::{Simd, dispatch, f32x8, prelude::*};
 
@@ -134,7 +134,14 @@ fn closest_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mu
         common: Common::new(simd, &bundle),
         nearest: std::array::from_fn(|i| {
             let (ray, within) = &rays[i];
-            Nearest::new(mesh, ray, *within, Limits::PLAIN, bundle.rays[i / 8].t_max[i % 8])
+            Nearest::new(
+                mesh,
+                ray,
+                *within,
+                Limits::PLAIN,
+                Sure::new(Limits::PLAIN, *within),
+                bundle.rays[i / 8].t_max[i % 8],
+            )
         }),
         t_max: bundle.t_max,
     };
@@ -143,7 +150,7 @@ fn closest_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mu
         return false;
     }
     for (hit, nearest) in hits.iter_mut().zip(&mut walk.nearest) {
-        *hit = nearest.settle(simd);
+        nearest.settle(simd, hit);
     }
     true
 }

@@ -250,7 +250,10 @@ pub(super) fn filter<S: Simd>(
     if maybe == 0 {
         return None;
     }
-    let depths = Depths { numerator: signed.into(), denominator: size_of_det.into(), margin: depth.into() };
+    // And the two roundings of each end.
+    let depth = signed.abs().mul_add(splat(simd, 4.0 * E), depth);
+    let (low, high) = ((signed - depth) / size_of_det, (signed + depth) / size_of_det);
+    let depths = Depths { low: low.into(), high: high.into() };
     Some(Outcome { maybe, through: through.to_bitmask() as u32, depths })
 }
 
@@ -354,21 +357,16 @@ pub(super) struct Outcome {
     pub(super) depths: Depths,
 }
 
-/// t of a leaf's triangles, by lane: |numerator − t·denominator| ≤ margin at the exact t.
+/// t of a leaf's triangles, by lane: the exact t is between these. NaN if nothing is known.
 pub(super) struct Depths {
-    numerator: [f32; 8],
-    denominator: [f32; 8],
-    margin: [f32; 8],
+    low: [f32; 8],
+    high: [f32; 8],
 }
 
 impl Depths {
-    /// The exact t is between these; NaN if nothing is known.
     #[inline(always)]
-    pub(super) fn interval(&self, lane: usize) -> (f32, f32) {
-        let (n, d) = (self.numerator[lane & 7], self.denominator[lane & 7]);
-        // And the two roundings of each end.
-        let m = self.margin[lane & 7] + n.abs() * (4.0 * E);
-        ((n - m) / d, (n + m) / d)
+    pub(super) fn interval(&self, lane: usize) -> [f32; 2] {
+        [self.low[lane & 7], self.high[lane & 7]]
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Mesh;
 use super::leaf::{Leaf, Outcome, Probe};
-use crate::bvh::{self, Lanes, Limits, LocalRay};
+use crate::bvh::{self, Lanes, Limits, LocalRay, Sure};
 use crate::kernel::eft::{Fused, Split};
 use crate::kernel::{tally, triangle};
 use crate::{Hit, Interval, Ray};
@@ -13,7 +13,31 @@ use std::cmp::Ordering;
 /// The nearest hit; the lowest triangle of those met at exactly the same λ.
 pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
     let asked = Asked::new(ray, within);
-    dispatch!(mesh.level.token(), simd => closest_with(simd, mesh, asked.ray, asked.within()))
+    // The one place for the answer on the way through all functions: returned, it would be copied by each.
+    let mut hit = None;
+    dispatch!(mesh.level.token(), simd => {
+        if is_baseline(simd) {
+            closest_apart(simd, mesh, &asked, &mut hit);
+        } else {
+            closest_with(simd, mesh, &asked, &mut hit);
+        }
+    });
+    hit
+}
+
+/// Whether these instructions need no function of their own. Then the query would be inlined into the one that dispatches,
+/// and all others would pay for its frame.
+#[inline(always)]
+fn is_baseline<S: Simd>(simd: S) -> bool {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    return !matches!(simd.level(), Level::Sse4_2(_) | Level::Avx2(_) | Level::Avx512(_));
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    true
+}
+
+#[inline(never)]
+fn closest_apart<S: Simd>(simd: S, mesh: &Mesh, asked: &Asked, hit: &mut Option<Hit>) {
+    closest_with(simd, mesh, asked, hit);
 }
 
 /// A query on its way into a dispatched function, which takes it through memory. The limits do not stand side by side: they
@@ -38,24 +62,36 @@ impl<'a> Asked<'a> {
 }
 
 #[inline(always)]
-fn closest_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
-    let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else { return closest_of_all(mesh, ray, within) };
+fn closest_with<S: Simd>(simd: S, mesh: &Mesh, asked: &Asked, hit: &mut Option<Hit>) {
+    let (ray, within) = (asked.ray, asked.within());
+    let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else {
+        *hit = closest_of_all(mesh, ray, within);
+        return;
+    };
     let mut walk = Single {
         probe: Probe::new(&local, mesh.exact),
-        nearest: Nearest::new(mesh, ray, within, local.limits, local.t_max),
+        nearest: Nearest::new(mesh, ray, within, local.limits, local.sure, local.t_max),
     };
     bvh::closest(simd, &mesh.tree, &Lanes::new(simd, &local), local.t_max, &mut walk);
-    walk.nearest.settle(simd)
+    walk.nearest.settle(simd, hit);
 }
 
 /// Whether anything is hit.
 pub(super) fn any(mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
     let asked = Asked::new(ray, within);
-    dispatch!(mesh.level.token(), simd => any_with(simd, mesh, asked.ray, asked.within()))
+    dispatch!(mesh.level.token(), simd => {
+        if is_baseline(simd) { any_apart(simd, mesh, &asked) } else { any_with(simd, mesh, &asked) }
+    })
+}
+
+#[inline(never)]
+fn any_apart<S: Simd>(simd: S, mesh: &Mesh, asked: &Asked) -> bool {
+    any_with(simd, mesh, asked)
 }
 
 #[inline(always)]
-fn any_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
+fn any_with<S: Simd>(simd: S, mesh: &Mesh, asked: &Asked) -> bool {
+    let (ray, within) = (asked.ray, asked.within());
     let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else {
         return closest_of_all(mesh, ray, within).is_some();
     };
@@ -110,26 +146,6 @@ fn confirm<S: Simd>(simd: S, ray: &Ray, vertices: &[DVec3; 3], within: Interval)
     }
 }
 
-/// What is certainly inside the interval: limits of t rounded inward.
-#[derive(Clone, Copy)]
-pub(super) struct Sure {
-    min: f32,
-    max: f32,
-}
-
-impl Sure {
-    #[inline(always)]
-    pub(super) fn new(limits: Limits, within: Interval) -> Self {
-        Self { min: limits.upper(within.min), max: limits.lower(within.max) }
-    }
-
-    /// Whether a t between these is inside for certain; not if one is NaN.
-    #[inline(always)]
-    pub(super) fn holds(self, (low, high): (f32, f32)) -> bool {
-        (low > self.min) & (high < self.max)
-    }
-}
-
 /// A triangle that is certainly hit, at this t or later.
 #[derive(Clone, Copy)]
 struct Passed {
@@ -147,6 +163,7 @@ pub(super) struct Nearest<'a> {
     ray: &'a Ray,
     within: Interval,
     limits: Limits,
+    sure: Sure,
     pub(super) t_max: f32,
     passed: [Passed; MOST_PASSED],
     count: usize,
@@ -155,34 +172,34 @@ pub(super) struct Nearest<'a> {
 
 impl<'a> Nearest<'a> {
     #[inline(always)]
-    pub(super) fn new(mesh: &'a Mesh, ray: &'a Ray, within: Interval, limits: Limits, t_max: f32) -> Self {
+    pub(super) fn new(mesh: &'a Mesh, ray: &'a Ray, within: Interval, limits: Limits, sure: Sure, t_max: f32) -> Self {
         let passed = [Passed { leaf: 0, lane: 0, t: 0.0 }; MOST_PASSED];
-        Self { mesh, ray, within, limits, t_max, passed, count: 0, best: None }
+        Self { mesh, ray, within, limits, sure, t_max, passed, count: 0, best: None }
     }
 
     /// The answer.
     #[inline(always)]
-    pub(super) fn settle<S: Simd>(&mut self, simd: S) -> Option<Hit> {
+    pub(super) fn settle<S: Simd>(&mut self, simd: S, hit: &mut Option<Hit>) {
+        if self.count == 1 && self.best.is_none() {
+            // The rule.
+            let Passed { leaf, lane, .. } = self.passed[0];
+            *hit = self.exactly(simd, leaf, lane);
+            return;
+        }
         if self.count > 0 {
             self.decide(simd);
         }
-        self.best
+        *hit = self.best;
     }
 
     /// Considers a triangle that may be met between the t of `depth`; `through`: whose inside the line certainly passes.
     #[inline(always)]
-    pub(super) fn consider<S: Simd>(
-        &mut self,
-        simd: S,
-        [leaf, lane]: [u32; 2],
-        through: bool,
-        (low, high): (f32, f32),
-    ) {
+    pub(super) fn consider<S: Simd>(&mut self, simd: S, [leaf, lane]: [u32; 2], through: bool, [low, high]: [f32; 2]) {
         // Elsewhere the sign of the denominator is not known, and the depths mean nothing.
         if through && low > self.t_max {
             return;
         }
-        if !(through && Sure::new(self.limits, self.within).holds((low, high))) {
+        if !(through && self.sure.holds([low, high])) {
             return self.confirm(simd, leaf, lane);
         }
         if high < self.t_max {
@@ -206,15 +223,21 @@ impl<'a> Nearest<'a> {
         }
     }
 
+    /// The triangle's hit.
+    #[inline(always)]
+    fn exactly<S: Simd>(&self, simd: S, leaf: u32, lane: u32) -> Option<Hit> {
+        let leaf = &self.mesh.leaves[leaf as usize];
+        let vertices = leaf.vertices(lane as usize & 7, self.mesh);
+        let hit = confirm(simd, self.ray, &vertices, self.within)?;
+        Some(Hit { part: leaf.number(lane as usize & 7), ..hit })
+    }
+
     #[inline(never)]
     fn confirm<S: Simd>(&mut self, simd: S, leaf: u32, lane: u32) {
         simd.vectorize(
             #[inline(always)]
             || {
-                let leaf = &self.mesh.leaves[leaf as usize];
-                let vertices = leaf.vertices(lane as usize & 7, self.mesh);
-                let Some(hit) = confirm(simd, self.ray, &vertices, self.within) else { return };
-                let hit = Hit { part: leaf.number(lane as usize & 7), ..hit };
+                let Some(hit) = self.exactly(simd, leaf, lane) else { return };
                 let best = nearer(self.mesh, self.ray, self.best, hit);
                 self.best = Some(best);
                 let t = self.limits.upper(best.lambda + best.error);
@@ -298,7 +321,7 @@ impl First<'_> {
     #[inline(never)]
     fn candidates<S: Simd>(&self, simd: S, leaf: &Leaf, outcome: &Outcome) -> bool {
         let &Outcome { maybe: lanes, through, ref depths } = outcome;
-        let sure = Sure::new(self.local.limits, self.within);
+        let sure = self.local.sure;
         let each = |lanes: u32| (0..8).filter(move |lane| lanes >> lane & 1 == 1);
         each(lanes & through).any(|lane| sure.holds(depths.interval(lane)))
             || each(lanes).any(|lane| occluded(simd, self.mesh, self.ray, self.within, leaf, lane))
