@@ -21,18 +21,22 @@ pub const UNDERFLOW: f64 = f64::from_bits((1023 - 1000) << 52); // 2⁻¹⁰⁰�
 /// components; the last one covers the bound's own arithmetic.
 pub const TRIANGLE_SIDES: f64 = 50.0 * U;
 
-/// Triangle, docs/numerics.md §4: the fast path's λ, beyond its last rounding, is off by this times
-/// (|e₁||e₂|/|D|)·(|s| + |λ||d|), in largest components, as long as that is below 3u|λ|. Far more than it need be: the
-/// double-doubles' errors are of order u², and so small a constant does for κ up to 10⁶.
-pub const TRIANGLE_LAMBDA: f64 = U / (1 << 20) as f64;
+/// Triangle, docs/numerics.md §4: the fast path takes a ray if |e₁||e₂||d| and |e₁||e₂||s|, in largest components, are below
+/// this times |D| and |N|.
+pub const TRIANGLE_CONDITION: f64 = (1 << 18) as f64;
+
+/// Triangle, docs/numerics.md §4: then λ, beyond its last rounding, is off by less than this times |λ|.
+pub const TRIANGLE_LAMBDA: f64 = U / 16.0;
 
 /// Triangle, docs/numerics.md §4: in double-double each edge function is off by this times |d|·(|e₁||e₂| + |s|(|e₁|+|e₂|)),
 /// and λ, beyond its last rounding, by this times (|e₁||e₂|/|D|)·(|s| + |λ||d|).
 pub const TRIANGLE_CLOSE: f64 = 600.0 * U * U;
 
-/// Plane, docs/numerics.md §3: what does instead of [`PLANE_QUOTIENT`]·κ as long as λ comes out known to ¼u|λ|, which
-/// leaves κ below 2¹⁸.
-pub const PLANE_LAMBDA: f64 = U / (1 << 20) as f64;
+/// Plane, docs/numerics.md §3: the fast path takes a ray if the sums of absolute products are below this times |D| and |N|.
+pub const PLANE_CONDITION: f64 = (1 << 18) as f64;
+
+/// Plane, docs/numerics.md §3: then λ, beyond its last rounding, is off by less than this times |λ|.
+pub const PLANE_LAMBDA: f64 = U / 256.0;
 
 /// Plane, docs/numerics.md §3: λ beyond its last rounding is off by this times u²κ(P_N/|D| + |λ|κ), where P are the sums of
 /// the products' absolute values and κ = P_D/|D|.

@@ -4,15 +4,31 @@
 //! same order, so that their bits agree.
 
 use super::eft::{Product, Split, two_diff, two_sum};
-use fearless_simd::{Simd, SimdFrom, f64x4};
+use fearless_simd::{Simd, SimdFrom, f64x2, f64x4};
 use glam::DVec3;
 use std::fmt::Debug;
 use std::ops::{Add, Mul, Sub};
+
+/// Two floats.
+pub trait Two: Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// Both.
+    fn to_array(self) -> [f64; 2];
+    /// `x` in each lane, on the CPU of this.
+    #[must_use]
+    fn splat(self, x: f64) -> Self;
+    /// |self|.
+    #[must_use]
+    fn abs(self) -> Self;
+    /// Whether least < self < most in both lanes: a NaN anywhere is not.
+    fn is_between(self, least: Self, most: f64) -> bool;
+}
 
 /// Four floats: x, y, z and one that means nothing.
 pub trait Lanes: Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// The proof that this CPU has the instructions.
     type Cpu: Copy;
+    /// Half of it.
+    type Half: Two;
     /// These four.
     fn new(cpu: Self::Cpu, lanes: [f64; 4]) -> Self;
     /// Another four, on the CPU of this.
@@ -57,15 +73,22 @@ pub trait Lanes: Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Ou
         (self * other.turned() - self.turned() * other).turned()
     }
 
+    /// The x, the y and the z of two vectors.
+    #[must_use]
+    fn rows(self, other: Self) -> [Self::Half; 3];
+    /// The first two.
+    #[must_use]
+    fn low(self) -> Self::Half;
+
     /// The x, the y and the z of four vectors.
     #[must_use]
     fn columns(vectors: [Self; 4]) -> [Self; 3];
 
     /// The largest |component| of four vectors.
     #[inline(always)]
-    fn largest(vectors: [Self; 4]) -> [f64; 4] {
+    fn largest(vectors: [Self; 4]) -> Self {
         let [x, y, z] = Self::columns(vectors.map(Self::abs));
-        x.max(y).max(z).to_array()
+        x.max(y).max(z)
     }
 }
 
@@ -150,8 +173,33 @@ impl<L: Lanes> Double<L> {
     }
 }
 
+impl<S: Simd> Two for f64x2<S> {
+    #[inline(always)]
+    fn to_array(self) -> [f64; 2] {
+        self.into()
+    }
+
+    #[inline(always)]
+    fn splat(self, x: f64) -> Self {
+        self.simd.splat_f64x2(x)
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.simd.abs_f64x2(self)
+    }
+
+    #[inline(always)]
+    fn is_between(self, least: Self, most: f64) -> bool {
+        let cpu = self.simd;
+        let (above, below) = (cpu.simd_lt_f64x2(least, self), cpu.simd_lt_f64x2(self, self.splat(most)));
+        cpu.all_true_mask64x2(cpu.and_mask64x2(above, below))
+    }
+}
+
 impl<S: Simd> Lanes for f64x4<S> {
     type Cpu = S;
+    type Half = f64x2<S>;
 
     #[inline(always)]
     fn new(cpu: S, lanes: [f64; 4]) -> Self {
@@ -179,14 +227,22 @@ impl<S: Simd> Lanes for f64x4<S> {
     }
 
     #[inline(always)]
+    fn rows(self, other: Self) -> [f64x2<S>; 3] {
+        let cpu = self.simd;
+        let (xy, z) = (cpu.zip_low_f64x4(self, other), cpu.zip_high_f64x4(self, other));
+        let ((x, y), (z, _)) = (cpu.split_f64x4(xy), cpu.split_f64x4(z));
+        [x, y, z]
+    }
+
+    #[inline(always)]
+    fn low(self) -> f64x2<S> {
+        self.simd.split_f64x4(self).0
+    }
+
+    #[inline(always)]
     fn columns([a, b, c, d]: [Self; 4]) -> [Self; 3] {
         let cpu = a.simd;
-        let two = |a: Self, b: Self| {
-            let (xy, z) = (cpu.zip_low_f64x4(a, b), cpu.zip_high_f64x4(a, b));
-            let ((x, y), (z, _)) = (cpu.split_f64x4(xy), cpu.split_f64x4(z));
-            [x, y, z]
-        };
-        let ([x, y, z], [t, u, v]) = (two(a, b), two(c, d));
+        let ([x, y, z], [t, u, v]) = (a.rows(b), c.rows(d));
         [cpu.combine_f64x2(x, t), cpu.combine_f64x2(y, u), cpu.combine_f64x2(z, v)]
     }
 
@@ -198,19 +254,18 @@ impl<S: Simd> Lanes for f64x4<S> {
     }
 }
 
-/// Four floats on any CPU; products are those of [`Split`].
+/// Floats on any CPU; products are those of [`Split`].
 #[derive(Clone, Copy, Debug)]
-pub struct Plain([f64; 4]);
+pub struct Plain<const N: usize = 4>([f64; N]);
 
-impl Plain {
+impl<const N: usize> Plain<N> {
     #[inline(always)]
     fn with(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let (a, b) = (self.0, other.0);
-        Self([f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2]), f(a[3], b[3])])
+        Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
     }
 }
 
-impl Add for Plain {
+impl<const N: usize> Add for Plain<N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -218,7 +273,7 @@ impl Add for Plain {
     }
 }
 
-impl Sub for Plain {
+impl<const N: usize> Sub for Plain<N> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -226,7 +281,7 @@ impl Sub for Plain {
     }
 }
 
-impl Mul for Plain {
+impl<const N: usize> Mul for Plain<N> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -234,8 +289,32 @@ impl Mul for Plain {
     }
 }
 
+impl Two for Plain<2> {
+    #[inline(always)]
+    fn to_array(self) -> [f64; 2] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn splat(self, x: f64) -> Self {
+        Self([x; 2])
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(f64::abs))
+    }
+
+    #[inline(always)]
+    fn is_between(self, least: Self, most: f64) -> bool {
+        let ([a, b], [c, d]) = (self.0, least.0);
+        (c < a) & (d < b) & (a < most) & (b < most)
+    }
+}
+
 impl Lanes for Plain {
     type Cpu = ();
+    type Half = Plain<2>;
 
     #[inline(always)]
     fn new((): (), lanes: [f64; 4]) -> Self {
@@ -260,6 +339,16 @@ impl Lanes for Plain {
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         self.with(other, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn rows(self, other: Self) -> [Plain<2>; 3] {
+        [0, 1, 2].map(|i| Plain([self.0[i], other.0[i]]))
+    }
+
+    #[inline(always)]
+    fn low(self) -> Plain<2> {
+        Plain([self.0[0], self.0[1]])
     }
 
     #[inline(always)]

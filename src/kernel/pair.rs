@@ -11,6 +11,15 @@ pub(super) struct Pair {
     pub(super) lo: DVec3,
 }
 
+/// s + t + low parts = |p|² − r².
+struct Squares {
+    s: f64,
+    t: f64,
+    sums_lo: f64,
+    products_lo: f64,
+    mixed: f64,
+}
+
 impl Pair {
     #[inline(always)]
     pub(super) fn difference(a: DVec3, b: DVec3) -> Self {
@@ -31,13 +40,26 @@ impl Pair {
     /// |self|² − (radius + lo)².
     #[inline(always)]
     pub(super) fn squared_less<P: Product>(&self, radius: f64, lo: f64) -> f64 {
+        let Squares { s, t, sums_lo, products_lo, mixed } = self.squares::<P>(radius);
+        let (sum, sum_lo) = two_sum(s, t);
+        sum + ((sum_lo + sums_lo) + products_lo + (mixed - lo * (2.0 * radius + lo)))
+    }
+
+    /// |self|² − radius² where it nearly vanishes: the largest terms' sum is rounded like the result.
+    #[inline(always)]
+    pub(super) fn residual<P: Product>(&self, radius: f64) -> f64 {
+        let Squares { s, t, sums_lo, products_lo, mixed } = self.squares::<P>(radius);
+        (s + t) + ((sums_lo + products_lo) + mixed)
+    }
+
+    #[inline(always)]
+    fn squares<P: Product>(&self, radius: f64) -> Squares {
         let Self { hi: h, lo: l } = *self;
         let ((x, x_lo), (y, y_lo)) = (P::two_product(h.x, h.x), P::two_product(h.y, h.y));
         let ((z, z_lo), (r, r_lo)) = (P::two_product(h.z, h.z), P::two_product(radius, radius));
         let ((s, s_lo), (t, t_lo)) = (two_sum(x, y), two_diff(z, r));
-        let (sum, sum_lo) = two_sum(s, t);
-        let mixed = plain_dot(l, 2.0 * h + l) - lo * (2.0 * radius + lo);
-        sum + ((sum_lo + (s_lo + t_lo)) + ((x_lo + y_lo) + (z_lo - r_lo)) + mixed)
+        let (sums_lo, products_lo) = (s_lo + t_lo, (x_lo + y_lo) + (z_lo - r_lo));
+        Squares { s, t, sums_lo, products_lo, mixed: plain_dot(l, 2.0 * h + l) }
     }
 
     /// self · other as an unevaluated sum.

@@ -3,11 +3,11 @@
 //! Both dot products are compensated (Ogita, Rump, Oishi 2005) with the rounding errors of p−o; one remainder step makes
 //! the quotient of the double-doubles. docs/numerics.md §3.
 
-use super::bound::{PLANE_LAMBDA, PLANE_QUOTIENT, U, UNDERFLOW};
+use super::bound::{PLANE_CONDITION, PLANE_LAMBDA, PLANE_QUOTIENT, U, UNDERFLOW};
 use super::cpu;
 use super::eft::{Fused, Product, Split, two_diff, two_sum};
 use super::float::{exponent_of, ldexp, power};
-use super::lanes::{Double, Lanes};
+use super::lanes::{Double, Lanes, Two};
 use super::number::{self, Number, difference, dot, vector};
 use super::ratio::{self, Ratio};
 use super::tally;
@@ -22,11 +22,12 @@ use std::cmp::Ordering;
 #[inline]
 #[must_use]
 pub fn intersect(ray: &Ray, point: DVec3, normal: DVec3, within: Interval) -> Option<Hit> {
+    let (point, normal) = (&point, &normal);
     cpu::dispatch_lanes(
         #[inline(always)]
-        |cpu| fast::<Fused>(cpu, ray, &point, &normal, within),
+        move |cpu| fast::<Fused>(cpu, ray, point, normal, within),
         #[inline(always)]
-        || fast::<Split>((), ray, &point, &normal, within),
+        move || fast::<Split>((), ray, point, normal, within),
     )
 }
 
@@ -92,32 +93,35 @@ fn solve<P: Product, const CLOSE: bool>(
         }
     };
     // The denominator and the numerator side by side.
-    let [x, y, z] = Lanes::columns([nd.hi, ns.hi, nd.hi, ns.hi]);
+    let [x, y, z] = nd.hi.rows(ns.hi);
     let (xy, rounding) = two_sum(x, y);
     let (sums, more_rounding) = two_sum(xy, z);
-    let [den, num, ..] = sums.to_array();
-    let [den_size, num_size, ..] = ((x.abs() + y.abs()) + z.abs()).to_array();
+    let sizes = (x.abs() + y.abs()) + z.abs();
+    let [den, num] = sums.to_array();
     let inverse = 1.0 / den;
     let q = num * inverse;
-    let (over, size) = (inverse.abs(), num_size + q.abs() * den_size);
 
     // Proved before it is computed.
     let (beyond_rounding, known) = if CLOSE {
+        let [den_size, num_size] = sizes.to_array();
+        let (over, size) = (inverse.abs(), num_size + q.abs() * den_size);
         let kappa = den_size * over;
         let beyond_rounding = PLANE_QUOTIENT * kappa * (over * size);
         let [md, ms] = [ray.direction, *point - ray.origin].map(|v| v.abs().max_element());
         let tiny = beyond_rounding * md < FLOOR * ms;
-        (beyond_rounding, ((beyond_rounding < 0.25 * U * q.abs()) | tiny) & (kappa < 1.0 / (64.0 * U)))
+        let known = ((beyond_rounding < 0.25 * U * q.abs()) | tiny) & (kappa < 1.0 / (64.0 * U));
+        (beyond_rounding, known & (den.abs() > PRESENT) & (q.abs() > PRESENT))
     } else {
-        let beyond_rounding = PLANE_LAMBDA * (over * size);
-        (beyond_rounding, beyond_rounding < 0.25 * U * q.abs())
+        // Neither sum has lost more than 18 of its bits, nor anything that counts to underflow.
+        let least = sizes + sizes.splat(PLANE_CONDITION * PRESENT);
+        let known = (sums.abs() * sums.splat(PLANE_CONDITION)).is_between(least, PLANE_CONDITION / PRESENT);
+        (PLANE_LAMBDA * q.abs(), known)
     };
-    // Above these nothing that is lost by underflow counts.
-    if !known || !((den.abs() > PRESENT) & (q.abs() > PRESENT)) {
+    if !known {
         return None;
     }
-    let [lx, ly, lz] = Lanes::columns([nd.lo, ns.lo, nd.lo, ns.lo]);
-    let [den_lo, num_lo, ..] = ((rounding + more_rounding) + ((lx + ly) + lz)).to_array();
+    let [lx, ly, lz] = nd.lo.rows(ns.lo);
+    let [den_lo, num_lo] = ((rounding + more_rounding) + ((lx + ly) + lz)).to_array();
     let (t, t_lo) = P::two_product(q, den);
     let remainder = ((num - t) - t_lo) + (num_lo - q * den_lo);
     Some(Solved { q, correction: remainder * inverse, beyond_rounding })
@@ -137,7 +141,7 @@ pub(super) fn quotient<P: Product, const CLOSE: bool>(
         return Quotient::Uncertain;
     };
     let lambda = q + correction;
-    let error = (U * q.abs() + beyond_rounding) * (1.0 + 8.0 * U);
+    let error = if CLOSE { (U * q.abs() + beyond_rounding) * (1.0 + 8.0 * U) } else { (U + PLANE_LAMBDA) * q.abs() };
     if (lambda - error > within.min) & (lambda + error < within.max) {
         return Quotient::Inside { lambda, error };
     }

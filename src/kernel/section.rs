@@ -208,12 +208,15 @@ fn inside<N: Number>(end: &End<N>, part: u32, within: Interval, fine: f64) -> Re
     Ok(Place::Inside(Hit { lambda: rounded, error: lambda.error, uv: DVec2::ZERO, part }))
 }
 
+/// An ulp of this part of the largest coordinate over |direction| is the least that is promised of λ.
+pub(super) const FINE: f64 = 1.0 / (1u64 << 40) as f64;
+
 /// What is 2⁻⁴⁰ of the largest coordinate of ray and shape over |direction| at most: an ulp of it is the least that is
 /// promised of λ. Zero where that cannot be computed.
 #[inline(always)]
 pub(super) fn fine(ray: &Ray, extent: f64) -> f64 {
     let direction = 1.75 * ray.direction.abs().max_element();
-    let fine = ray.origin.abs().max_element().max(extent) * (1.0 / (1u64 << 40) as f64) / direction;
+    let fine = ray.origin.abs().max_element().max(extent) * FINE / direction;
     if fine < f64::INFINITY { fine } else { 0.0 }
 }
 

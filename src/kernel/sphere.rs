@@ -9,10 +9,10 @@
 
 use super::bound::U;
 use super::cpu;
-use super::eft::{Fused, Product, Split, two_sum};
+use super::eft::{Fused, Product, Split, quick_two_sum};
 use super::number::{Number, cross, difference, dot, vector};
-use super::pair::{Pair, in_range, plain_cross, plain_dot, taxicab};
-use super::section::{End, Quadratic, Undecided, fine, nearest, precise, refined, sign};
+use super::pair::{Pair, plain_cross, plain_dot, taxicab};
+use super::section::{End, FINE, Quadratic, Undecided, fine, nearest, precise, refined, sign};
 use super::tally;
 use crate::hit::Hit;
 use crate::interval::Interval;
@@ -23,11 +23,11 @@ use std::cmp::Ordering;
 /// |error of D| ≤ this·A·r·(r + |f|₁), wherever D and its rounded value are not both clearly negative.
 const DISCRIMINANT: f64 = 12.0 * U;
 /// |error of the first λ| ≤ this·z, z = u·r·(r + |f|₁)/√D.
-const FIRST: f64 = 22.0;
+const FIRST: f64 = 23.0;
 /// After the step: |error of λ| ≤ z·(`SQUARED`·A·z/√D + `RESIDUAL`), besides its last rounding.
-const SQUARED: f64 = 520.0;
+const SQUARED: f64 = 560.0;
 /// See [`SQUARED`].
-const RESIDUAL: f64 = 144.0 * U;
+const RESIDUAL: f64 = 176.0 * U;
 /// |error of C from double-double| ≤ this·(r² + |C|).
 const NEAR_C: f64 = 64.0 * U * U;
 /// |error of b from double-double| ≤ u·|b| + this/4·(|f|₁ + r)·|d|₁.
@@ -46,9 +46,9 @@ const FAR: f64 = (1u64 << 46) as f64;
 pub fn intersect(ray: &Ray, center: DVec3, radius: f64, within: Interval) -> Option<Hit> {
     cpu::dispatch(
         #[inline(always)]
-        || fast::<Fused>(ray, center, radius, within),
+        move || fast::<Fused>(ray, center, radius, within),
         #[inline(always)]
-        || fast::<Split>(ray, center, radius, within),
+        move || fast::<Split>(ray, center, radius, within),
     )
 }
 
@@ -65,11 +65,12 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
         return None;
     }
     let root = value.sqrt();
-    let (a, b) = (plain_dot(d, d), plain_dot(f.hi, d));
+    // One over A while the root is taken.
+    let (inverse, b) = (1.0 / plain_dot(d, d), plain_dot(f.hi, d));
     let (z, rest) = bounds(f.hi, d, r, root);
     // The root at which the polynomial falls (it is entered), then the one at which it rises.
     for slope in [-1.0, 1.0] {
-        let first = (slope * root - b) / a;
+        let first = (slope * root - b) * inverse;
         if first + FIRST * z <= within.min {
             continue;
         }
@@ -89,7 +90,9 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
             return cold();
         }
         // The ray starts next to the sphere, or grazes it.
-        let (lambda, error) = next_to_origin(ray, center.x, center.y, center.z, r, slope * root, error);
+        let root_error = error * (1.0 / root);
+        let root = slope * root;
+        let (lambda, error) = next_to_origin(ray, center.x, center.y, center.z, r, root, root_error, within.min >= 0.0);
         if lambda + error < within.min {
             continue;
         }
@@ -104,7 +107,9 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
 /// Whether nothing over- or underflows that counts; a NaN does.
 #[inline(always)]
 fn is_ordinary(f: DVec3, d: DVec3, r: f64) -> bool {
-    in_range(r, 225) & in_range(plain_dot(d, d) * r * r, 500) & (r + taxicab(f) < FAR * r)
+    // 2⁻²⁵⁶ ≤ x < 2²⁵⁶ for both at once: what is out of range, negative or not a number has one of the upper three bits.
+    let above = |x: f64| x.to_bits().wrapping_sub((1023 - 256) << 52);
+    ((above(r) | above(plain_dot(d, d) * r * r)) < 512 << 52) & (r + taxicab(f) < FAR * r)
 }
 
 /// D and a bound on its error.
@@ -125,45 +130,55 @@ fn bounds(f: DVec3, d: DVec3, r: f64, root: f64) -> (f64, f64) {
 /// λ + lo after one Newton step from `first`, with the slope at the root.
 #[inline(always)]
 fn step<P: Product>(f: &Pair, d: DVec3, r: f64, root: f64, slope: f64, first: f64) -> (f64, f64) {
-    let residual = f.moved::<P>(first, d).squared_less::<P>(r, 0.0);
-    two_sum(first, -slope * 0.5 * (1.0 / root) * residual)
+    let residual = f.moved::<P>(first, d).residual::<P>(r);
+    quick_two_sum(first, -slope * 0.5 * (1.0 / root) * residual)
 }
 
 /// λ and its error of a root next to the origin, as on a ray that starts on the sphere: C/(|b| + √D) with C in
-/// double-double, and b too if it must be. `root` is ∓√D, D being off by `error`. NaN where λ is not so small, or not known
-/// to a part of the least ulp that is promised.
+/// double-double, and b too if it must be. `root` is ∓√D, off by `root_error`. NaN where λ is not so small, or not known
+/// to a part of the least ulp that is promised; −∞ where it is below zero and nobody asks further, which is `FORWARD`.
 #[inline(never)]
-fn next_to_origin(ray: &Ray, x: f64, y: f64, z: f64, r: f64, root: f64, error: f64) -> (f64, f64) {
+#[expect(clippy::too_many_arguments, reason = "scalars stay in registers")]
+fn next_to_origin(ray: &Ray, x: f64, y: f64, z: f64, r: f64, root: f64, root_error: f64, forward: bool) -> (f64, f64) {
     let center = DVec3::new(x, y, z);
     cpu::dispatch(
         #[inline(always)]
-        || small_root::<Fused>(ray, center, r, root, error),
+        move || small_root::<Fused>(ray, center, r, root, root_error, forward),
         #[inline(always)]
-        || small_root::<Split>(ray, center, r, root, error),
+        move || small_root::<Split>(ray, center, r, root, root_error, forward),
     )
 }
 
 #[inline(always)]
-fn small_root<P: Product>(ray: &Ray, center: DVec3, r: f64, root: f64, error: f64) -> (f64, f64) {
+fn small_root<P: Product>(ray: &Ray, center: DVec3, r: f64, root: f64, root_error: f64, forward: bool) -> (f64, f64) {
     let (f, d) = (Pair::difference(ray.origin, center), ray.direction);
-    let (a, size) = (plain_dot(d, d), r + taxicab(f.hi));
+    let (size, d1) = (r + taxicab(f.hi), taxicab(d));
     let c = f.squared_less::<P>(r, 0.0);
-    let least = 0.5 * U * fine(ray, center.abs().max_element().max(r));
-    // On the sphere b and √D will do as they are.
+    let c_error = NEAR_C * (r * r + c.abs());
+    // On the sphere b and √D will do as they are: how far off they may be, together, against their sum.
     let b = plain_dot(f.hi, d);
-    let over = 1.0 / (b.abs() + root.abs());
+    let (sum, off) = (b.abs() + root.abs(), 4.0 * U * size * d1 + root_error);
+    let near = (root * b > 0.0) & (off < 0.125 * sum);
+    if near & forward & (c * root.signum() > c_error) {
+        return (f64::NEG_INFINITY, 0.0);
+    }
+    let over = 1.0 / sum;
     let lambda = -c * over * root.signum();
-    // How far off b and √D may be, against their sum.
-    let doubt = (4.0 * U * size * taxicab(d) + error / root.abs()) * over;
-    let error = NEAR_C * (r * r + c.abs()) * over + lambda.abs() * (1.25 * doubt + 8.0 * U);
-    if (root * b > 0.0) & (doubt < 0.125) & (error <= least) {
+    let error = c_error * over + lambda.abs() * (1.25 * off * over + 8.0 * U);
+    // Mostly the radius is large enough.
+    if near & (error * (1.75 * d1) <= 0.5 * U * FINE * r) {
         return (lambda, error);
     }
+    let least = 0.5 * U * fine(ray, center.abs().max_element().max(r));
+    if near & (error <= least) {
+        return (lambda, error);
+    }
+    let a = plain_dot(d, d);
     let (b, b_lo) = f.dot_float::<P>(d);
     let b = b + b_lo;
     let over = 1.0 / (b.abs() + (b * b - a * c).sqrt());
     let lambda = -c * over * root.signum();
-    let error = NEAR_C * (r * r + c.abs()) * over + lambda.abs() * (16.0 * U + NEAR_B * size * taxicab(d) * over);
+    let error = NEAR_C * (r * r + c.abs()) * over + lambda.abs() * (16.0 * U + NEAR_B * size * d1 * over);
     let near = (root * b > 0.0) & (4.0 * a * c.abs() < b * b);
     if near & (error <= least) { (lambda, error) } else { (f64::NAN, f64::NAN) }
 }
@@ -277,7 +292,7 @@ mod tests {
                 }
                 let slope = x[6].signum();
                 let root = value.sqrt();
-                let first = (slope * root - plain_dot(f.hi, d)) / plain_dot(d, d);
+                let first = (slope * root - plain_dot(f.hi, d)) * (1.0 / plain_dot(d, d));
                 let (z, rest) = bounds(f.hi, d, r, root);
                 let [a, b, cc, _] = polynomial(o, c, d, r);
                 let (lambda, lo) = if after { step::<Split>(&f, d, r, root, slope, first) } else { (first, 0.0) };

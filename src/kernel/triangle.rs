@@ -4,14 +4,14 @@
 //! one filter; λ is the plane's quotient with a normal in double-double, its bound proved beforehand. Where the filter is
 //! silent the signs are found in double-double, in integers or by [`Dyadic`]s. docs/numerics.md §4.
 
-use super::bound::{TRIANGLE_CLOSE, TRIANGLE_LAMBDA, TRIANGLE_SIDES, U, UNDERFLOW};
+use super::bound::{TRIANGLE_CLOSE, TRIANGLE_CONDITION, TRIANGLE_LAMBDA, TRIANGLE_SIDES, U, UNDERFLOW};
 use super::bounded::Bounded;
 use super::cpu;
 use super::dyadic::Dyadic;
 use super::eft::{Fused, Product, Split, two_diff, two_sum};
 use super::fixed;
 use super::float::power;
-use super::lanes::{Double, Lanes};
+use super::lanes::{Double, Lanes, Two};
 use super::number::{self, Number, cross, difference, dot, vector};
 use super::ratio::{self, Ratio};
 use super::tally;
@@ -30,9 +30,9 @@ use std::cmp::Ordering;
 pub fn intersect(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
     cpu::dispatch_lanes(
         #[inline(always)]
-        |cpu| fast::<Fused>(cpu, ray, vertices, within),
+        move |cpu| fast::<Fused>(cpu, ray, vertices, within),
         #[inline(always)]
-        || fast::<Split>((), ray, vertices, within),
+        move || fast::<Split>((), ray, vertices, within),
     )
 }
 
@@ -57,7 +57,7 @@ fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3;
     let (forms, more_rounding) = two_sum(xy, z);
     let [det, height, su, minus_sv] = forms.to_array();
 
-    let sizes = Sizes::new([e1.hi, e2.hi, s.hi, d]);
+    let (sizes, m_d_s) = Sizes::new([d, s.hi, e1.hi, e2.hi]);
     let size = sizes.of_sides();
     if !sizes.are_ordinary() {
         return closely(ray, vertices, within);
@@ -72,18 +72,18 @@ fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3;
         return closely(ray, vertices, within);
     }
 
-    // Proved before it is computed.
-    let inverse = 1.0 / det;
-    let first = -height * inverse;
-    let ulp = U * first.abs();
-    let beyond_rounding = TRIANGLE_LAMBDA * (sizes.m12 * inverse.abs() * (sizes.s + first.abs() * sizes.d));
-    let error = (ulp + beyond_rounding) * (1.0 + 4.0 * U);
-    let known = (beyond_rounding < 3.0 * ulp) & (height.abs() > VANISHED);
+    // Proved before it is computed: neither D nor N has lost more than 18 of its bits.
+    let (sums, least) = (forms.low().abs(), m_d_s * m_d_s.splat(sizes.m12));
+    let least = least + least.splat(TRIANGLE_CONDITION * PRESENT);
+    let known = (sums * sums.splat(TRIANGLE_CONDITION)).is_between(least, TRIANGLE_CONDITION / PRESENT);
     if !known || bound > WEIGHT * det.abs() {
         return closely(ray, vertices, within);
     }
-    let [lx, ly, lz] = Lanes::columns([nd.lo, ns.lo, nd.lo, ns.lo]);
-    let [det_lo, height_lo, ..] = ((rounding + more_rounding) + ((lx + ly) + lz)).to_array();
+    let inverse = 1.0 / det;
+    let first = -height * inverse;
+    let error = (U + TRIANGLE_LAMBDA) * first.abs();
+    let [lx, ly, lz] = nd.lo.rows(ns.lo);
+    let [det_lo, height_lo] = ((rounding + more_rounding).low() + ((lx + ly) + lz)).to_array();
     let (t, t_lo) = P::two_product(first, det);
     let remainder = ((height + t) + t_lo) + (height_lo + first * det_lo);
     let lambda = first - remainder * inverse;
@@ -106,10 +106,12 @@ struct Sizes {
 }
 
 impl Sizes {
+    /// Of d, s, e₁, e₂; and d's and s's side by side.
     #[inline(always)]
-    fn new<L: Lanes>(vectors: [L; 4]) -> Self {
-        let [m1, m2, s, d] = L::largest(vectors);
-        Self { sum: m1 + m2, m12: m1 * m2, s, d }
+    fn new<L: Lanes>(vectors: [L; 4]) -> (Self, L::Half) {
+        let sizes = L::largest(vectors);
+        let [d, s, m1, m2] = sizes.to_array();
+        (Self { sum: m1 + m2, m12: m1 * m2, s, d }, sizes.low())
     }
 
     /// Nothing overflows, and underflow costs less than [`VANISHED`].
@@ -129,6 +131,8 @@ impl Sizes {
 const LARGEST: f64 = power(250);
 /// Triple products of such numbers lose less than 2⁻⁸²⁰ by underflow: nothing if they are above this.
 const VANISHED: f64 = power(-640);
+/// Between this and its inverse quotients have no range to mind either.
+const PRESENT: f64 = power(-450);
 /// How far off the weights may be that the fast path gives.
 const WEIGHT: f64 = power(-24);
 
@@ -191,7 +195,7 @@ impl Forms {
         let (e1, e2, s) = (Double::difference(b, a), Double::difference(c, a), Double::difference(o, a));
         let (n, q) = (e1.cross(e2), s.crossed_by(d));
         let products = [n.times_float(d), q.times(e2), q.times(e1), n.times(s)];
-        (Double::sums(products), Sizes::new([e1.hi, e2.hi, s.hi, d]))
+        (Double::sums(products), Sizes::new([d, s.hi, e1.hi, e2.hi]).0)
     }
 
     #[inline(always)]
@@ -478,8 +482,8 @@ mod tests {
             let (d, e1, e2, s) = (ray.direction, t[1] - t[0], t[2] - t[0], ray.origin - t[0]);
             let (q, det) = (d.cross(s), e1.cross(e2).dot(d));
             let (su, sv) = (q.dot(e2), -q.dot(e1));
-            let lanes = [e1, e2, s, d].map(|v| Plain::of((), v));
-            let bound = TRIANGLE_SIDES * Sizes::new(lanes).of_sides();
+            let lanes = [d, s, e1, e2].map(|v| Plain::of((), v));
+            let bound = TRIANGLE_SIDES * Sizes::new(lanes).0.of_sides();
             let exact = exact_products(&ray, &t);
             let sides = [su, sv, det - su - sv].into_iter();
             let off = sides.zip(&exact[1..]).map(|(f, e)| distance(e, [f, 0.0]) / bound);
