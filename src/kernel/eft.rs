@@ -46,6 +46,8 @@ pub trait Product: Copy + Debug {
     type Lanes: Lanes;
     /// (p, e): p = fl(a·b) and p + e = a·b exactly.
     fn two_product(a: f64, b: f64) -> (f64, f64);
+    /// n − q·d, rounded once, for a quotient q so near n/d that n − fl(q·d) is exact.
+    fn remainder(n: f64, q: f64, d: f64) -> f64;
     /// What [`Lanes`] need to know of the CPU: it is asked whether it has the instructions.
     fn cpu() -> <Self::Lanes as Lanes>::Cpu;
 }
@@ -72,6 +74,11 @@ impl Product for Fused {
         let p = a * b;
         (p, f64::mul_add(a, b, -p))
     }
+
+    #[inline(always)]
+    fn remainder(n: f64, q: f64, d: f64) -> f64 {
+        f64::mul_add(-q, d, n)
+    }
 }
 
 impl Product for Split {
@@ -86,6 +93,12 @@ impl Product for Split {
         let (a_hi, a_lo) = split(a);
         let (b_hi, b_lo) = split(b);
         (p, ((a_hi * b_hi - p) + a_hi * b_lo + a_lo * b_hi) + a_lo * b_lo)
+    }
+
+    #[inline(always)]
+    fn remainder(n: f64, q: f64, d: f64) -> f64 {
+        let (t, t_lo) = Self::two_product(q, d);
+        (n - t) - t_lo
     }
 }
 
@@ -122,6 +135,13 @@ mod tests {
         #[test]
         fn fused_and_split_products_have_the_same_bits(a in -1e60..1e60f64, b in -1e60..1e60f64) {
             prop_assert_eq!(Fused::two_product(a, b), Split::two_product(a, b));
+        }
+
+        #[test]
+        fn remainders_of_quotients_have_the_same_bits(n in -1e60..1e60f64, d in -1e60..1e60f64, off in -1e-4..1e-4f64) {
+            for q in [n / d, n * (1.0 / d), n / d * (1.0 + off)] {
+                prop_assert_eq!(Fused::remainder(n, q, d), Split::remainder(n, q, d));
+            }
         }
 
         #[test]

@@ -22,7 +22,7 @@ use std::cmp::Ordering;
 #[inline]
 #[must_use]
 pub fn intersect(ray: &Ray, point: DVec3, normal: DVec3, within: Interval) -> Option<Hit> {
-    let (point, normal) = (&point, &normal);
+    let (point, normal, within) = (&point, &normal, &within);
     cpu::dispatch_lanes(
         #[inline(always)]
         move |cpu| fast::<Fused>(cpu, ray, point, normal, within),
@@ -36,7 +36,7 @@ pub fn intersect(ray: &Ray, point: DVec3, normal: DVec3, within: Interval) -> Op
 #[inline(always)]
 #[must_use]
 pub fn intersect_with<P: Product>(ray: &Ray, point: DVec3, normal: DVec3, within: Interval) -> Option<Hit> {
-    fast::<P>(P::cpu(), ray, &point, &normal, within)
+    fast::<P>(P::cpu(), ray, &point, &normal, &within)
 }
 
 #[inline(always)]
@@ -45,12 +45,12 @@ fn fast<P: Product>(
     ray: &Ray,
     point: &DVec3,
     normal: &DVec3,
-    within: Interval,
+    within: &Interval,
 ) -> Option<Hit> {
-    match quotient::<P, false>(cpu, ray, point, normal, None, within) {
+    match quotient::<P, false>(cpu, ray, point, normal, None, *within) {
         Quotient::Outside => None,
         Quotient::Inside { lambda, error } => Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 }),
-        Quotient::Uncertain => refine(ray, point, normal, within.min, within.max),
+        Quotient::Uncertain => refine(ray, point, normal, within),
     }
 }
 
@@ -122,8 +122,7 @@ fn solve<P: Product, const CLOSE: bool>(
     }
     let [lx, ly, lz] = nd.lo.rows(ns.lo);
     let [den_lo, num_lo] = ((rounding + more_rounding) + ((lx + ly) + lz)).to_array();
-    let (t, t_lo) = P::two_product(q, den);
-    let remainder = ((num - t) - t_lo) + (num_lo - q * den_lo);
+    let remainder = P::remainder(num, q, den) + (num_lo - q * den_lo);
     Some(Solved { q, correction: remainder * inverse, beyond_rounding })
 }
 
@@ -189,12 +188,12 @@ fn ratio<N: Number>(ray: &Ray, point: DVec3, normal: DVec3) -> Ratio<N> {
     Ratio { numerator: dot(&n, &difference(point, ray.origin)), denominator: dot(&n, &vector(ray.direction)) }
 }
 
-/// By references and scalars, so that the caller's vectors stay in registers.
+/// By references, so that the caller's vectors stay in registers, and the limits in memory till they are compared with.
 #[cold]
 #[inline(never)]
-fn refine(ray: &Ray, point: &DVec3, normal: &DVec3, min: f64, max: f64) -> Option<Hit> {
+fn refine(ray: &Ray, point: &DVec3, normal: &DVec3, within: &Interval) -> Option<Hit> {
     tally::refined();
-    let within = Interval { min, max };
+    let within = *within;
     if !ray.is_valid() || within.is_empty() || !point.is_finite() || !normal.is_finite() {
         return None;
     }

@@ -28,6 +28,8 @@ use std::cmp::Ordering;
 #[inline]
 #[must_use]
 pub fn intersect(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
+    // By reference: a closure that owned what it lends would be copied first.
+    let within = &within;
     cpu::dispatch_lanes(
         #[inline(always)]
         move |cpu| fast::<Fused>(cpu, ray, vertices, within),
@@ -41,11 +43,11 @@ pub fn intersect(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<H
 #[inline(always)]
 #[must_use]
 pub fn intersect_with<P: Product>(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
-    fast::<P>(P::cpu(), ray, vertices, within)
+    fast::<P>(P::cpu(), ray, vertices, &within)
 }
 
 #[inline(always)]
-fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
+fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3; 3], within: &Interval) -> Option<Hit> {
     let lanes = |v: DVec3| P::Lanes::of(cpu, v);
     let (o, d, [a, b, c]) = (lanes(ray.origin), lanes(ray.direction), vertices.map(lanes));
     // u·e₁ + v·e₂ − λ·d = s
@@ -76,16 +78,16 @@ fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3;
     let (sums, least) = (forms.low().abs(), m_d_s * m_d_s.splat(sizes.m12));
     let least = least + least.splat(TRIANGLE_CONDITION * PRESENT);
     let known = (sums * sums.splat(TRIANGLE_CONDITION)).is_between(least, TRIANGLE_CONDITION / PRESENT);
-    if !known || bound > WEIGHT * det.abs() {
+    // Begun early: what follows waits for it.
+    let inverse = 1.0 / det;
+    if !known || bound * inverse.abs() > WEIGHT {
         return closely(ray, vertices, within);
     }
-    let inverse = 1.0 / det;
     let first = -height * inverse;
     let error = (U + TRIANGLE_LAMBDA) * first.abs();
     let [lx, ly, lz] = nd.lo.rows(ns.lo);
     let [det_lo, height_lo] = ((rounding + more_rounding).low() + ((lx + ly) + lz)).to_array();
-    let (t, t_lo) = P::two_product(first, det);
-    let remainder = ((height + t) + t_lo) + (height_lo + first * det_lo);
+    let remainder = P::remainder(height, -first, det) + (height_lo + first * det_lo);
     let lambda = first - remainder * inverse;
     if (lambda - error > within.min) & (lambda + error < within.max) {
         // Positive, and rounded above one at most.
@@ -146,7 +148,7 @@ fn extremes(u: f64, v: f64, w: f64) -> (f64, f64) {
 /// All four triple products in double-double, for near-ties, thin or grazed triangles and origins next to the plane.
 #[cold]
 #[inline(never)]
-fn closely(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
+fn closely(ray: &Ray, vertices: &[DVec3; 3], within: &Interval) -> Option<Hit> {
     tally::refined();
     let forms = Forms::of(ray, vertices);
     if !forms.is_hit().unwrap_or_else(|| is_hit(ray, vertices)) {
@@ -160,7 +162,7 @@ fn closely(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
     if (lambda + error < within.min) | (lambda - error > within.max) {
         return None;
     }
-    refine(ray, vertices, within)
+    refine(ray, vertices, *within)
 }
 
 /// The triple products, normalised, and the quotients that follow.
@@ -510,7 +512,7 @@ mod tests {
         };
         let worst = climb("triangle: λ and its rounding", DIMENSION, |x| {
             let (ray, t) = setting(x);
-            let hit = fast::<Split>((), &ray, &t, Interval::LINE)?;
+            let hit = fast::<Split>((), &ray, &t, &Interval::LINE)?;
             Some(distance(&exact_lambda(&ray, &t), [hit.lambda, 0.0]) / hit.error)
         });
         assert!((0.9..1.0).contains(&worst));
