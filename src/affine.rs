@@ -220,6 +220,17 @@ impl<S: Shape> Affine<S> {
     /// Where the corrected λ of `hit`, the first of the rounded image beyond `from`, lies against `within`.
     fn place(&self, image: &Image, hit: &Hit, within: Interval, from: f64) -> Place {
         let (shift, error) = self.shift(image, hit);
+        let corrected = corrected(hit, shift, error);
+        let Hit { lambda, error: off, .. } = corrected;
+        if lambda + off < within.min {
+            return Place::Before;
+        }
+        if lambda - off > within.max {
+            return Place::Beyond;
+        }
+        if lambda - off > within.min && lambda + off < within.max {
+            return Place::Inside(corrected);
+        }
         let [hi, lo] = self.innermost().precise_lambda(&image.ray, hit);
         // To a hundred bits but for `error`; λ + Δ − limit.
         let beyond = |limit: f64| {
@@ -251,6 +262,13 @@ impl<S: Shape> Affine<S> {
     }
 }
 
+/// `hit` where [`Affine::shift`] moves it.
+#[inline(always)]
+fn corrected(hit: &Hit, shift: f64, error: f64) -> Hit {
+    let lambda = hit.lambda + shift;
+    Hit { lambda, error: (hit.error + error + U * lambda.abs()) * INFLATE, ..*hit }
+}
+
 /// Where a hit lies against an interval.
 enum Place {
     Before,
@@ -280,8 +298,7 @@ impl<S: Shape> Shape for Affine<S> {
             Some((innermost, _)) => innermost.intersect(&image.ray, zone),
         }?;
         let (shift, error) = self.shift(&image, &hit);
-        let lambda = hit.lambda + shift;
-        let error = (hit.error + error + U * lambda.abs()) * INFLATE;
+        let Hit { lambda, error, .. } = corrected(&hit, shift, error);
         if lambda - error > within.min && lambda + error < within.max {
             return Some(Hit { lambda, error, ..hit });
         }
