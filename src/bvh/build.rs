@@ -37,14 +37,14 @@ impl Item {
 
     #[inline(always)]
     pub(super) fn count(&self) -> u32 {
-        ((self.0.0[7] as i32 as u32) >> (COUNT - 16)) + 1
+        const { assert!(LONGEST_RUN == 2) };
+        1 + u32::from(self.0.0[7] >= (1u32 << (COUNT - 16)) as f32)
     }
 
     /// Twice the centre; NaN for an infinite box.
     #[inline(always)]
     pub(super) fn middle<S: Simd>(&self, simd: S) -> f32x4<S> {
-        let [x, y, z, i, u, v, w, j] = self.0.0;
-        let (least, most): (f32x4<S>, f32x4<S>) = ([x, y, z, i].simd_into(simd), [u, v, w, j].simd_into(simd));
+        let (least, most) = self.0.load(simd).split();
         least - most
     }
 }
@@ -59,26 +59,29 @@ impl Box8 {
     pub(super) const EMPTY: Self = Self([f32::INFINITY; 8]);
 
     #[inline(always)]
+    pub(super) fn load<S: Simd>(&self, simd: S) -> f32x8<S> {
+        self.0.simd_into(simd)
+    }
+
+    #[inline(always)]
     pub(super) fn grow<S: Simd>(&mut self, simd: S, other: &Self) {
-        let (a, b): (f32x8<S>, f32x8<S>) = (self.0.simd_into(simd), other.0.simd_into(simd));
-        self.0 = a.min(b).into();
+        self.0 = self.load(simd).min(other.load(simd)).into();
     }
 
     #[inline(always)]
     pub(super) fn around<S: Simd>(simd: S, items: &[Item]) -> Self {
-        let mut b = Self::EMPTY;
+        let mut b = Self::EMPTY.load(simd);
         for i in items {
-            b.grow(simd, &i.0);
+            b = b.min(i.0.load(simd));
         }
-        b
+        Self(b.into())
     }
 
     /// Half the surface.
     #[inline(always)]
-    pub(super) fn half_area(&self) -> f32 {
+    fn half_area(&self) -> f32 {
         let [x, y, z, _, u, v, w, _] = self.0;
-        let (x, y, z) = (x + u, y + v, z + w);
-        x * y + y * z + z * x
+        area_of_sides([x + u, y + v, z + w])
     }
 
     /// Twice the centre's coordinate.
@@ -93,6 +96,19 @@ impl Box8 {
     }
 }
 
+/// Half the surface of a [`Box8`] in a register.
+#[inline(always)]
+pub(super) fn half_area_of<S: Simd>(b: f32x8<S>) -> f32 {
+    let (least, most) = b.split();
+    let [x, y, z, _]: [f32; 4] = (least + most).into();
+    area_of_sides([x, y, z])
+}
+
+#[inline(always)]
+fn area_of_sides([x, y, z]: [f32; 3]) -> f32 {
+    x * y + y * z + z * x
+}
+
 /// A node of the binary tree. A leaf holds `count` items from `first`; an inner node (`count` = 0) has its children at
 /// `first` and `first` + 1.
 #[derive(Clone, Copy, Debug)]
@@ -105,7 +121,8 @@ pub(super) struct Node {
 }
 
 impl Node {
-    const VACANT: Self = Self { min: [0.0; 3], first: 0, max: [0.0; 3], count: 0 };
+    /// Nobody's child, and nobody's parent.
+    const VACANT: Self = Self { min: [0.0; 3], first: 0, max: [0.0; 3], count: u32::MAX };
 
     #[inline(always)]
     pub(super) fn is_leaf(&self) -> bool {
@@ -121,13 +138,13 @@ impl Node {
 /// Half the surface of a box; infinite boxes have a large finite one, so that sums stay comparable.
 #[inline(always)]
 pub(super) fn half_area(min: &[f32; 3], max: &[f32; 3]) -> f32 {
-    let side = |i: usize| if max[i] - min[i] < 1e9 { max[i] - min[i] } else { 1e9 };
+    let side = |i: usize| (max[i] - min[i]).min(1e9);
     let (x, y, z) = (side(0), side(1), side(2));
     x * y + y * z + z * x
 }
 
-/// The binary tree; `nodes[0]` is the root, slot 1 is vacant, and siblings lie in pairs from slot 2 on. No nodes if
-/// there are no items.
+/// The binary tree; `nodes[0]` is the root, slot 1 is vacant and others may be, and siblings lie in pairs from slot 2 on,
+/// after their parents. No nodes if there are no items.
 #[derive(Debug)]
 pub(super) struct Binary {
     pub(super) frame: Frame,

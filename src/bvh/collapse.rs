@@ -2,9 +2,11 @@
 
 use super::build::{Binary, Item, Node};
 use super::reinsert;
+use super::tasks;
 use super::watch::Watch;
 use super::wide::{LEAF, Wide, WideNode};
 use crate::Aabb;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// A tree and what its leaves hold.
 #[derive(Debug)]
@@ -36,17 +38,22 @@ pub(crate) fn build(
     Some(Plan::new(&binary, leaf).collapse(&binary))
 }
 
-/// What becomes of each binary node.
+/// What becomes of each binary node. Written by many threads, each its own entries.
 struct Plan {
     /// Items below.
-    sizes: Vec<u32>,
+    sizes: Vec<AtomicU32>,
     /// Three bits for each number of lanes 2–8: how many of them the left child gets, or 0 for one lane fewer; and
     /// [`AS_LEAF`].
-    choices: Vec<u32>,
+    choices: Vec<AtomicU32>,
     leaf: u32,
 }
 
 const AS_LEAF: u32 = 1;
+
+/// Down to here subtrees are planned at the same time.
+const PARALLEL_DEPTH: u32 = 8;
+/// Subtrees of fewer objects are collapsed at the same time. Not to depend on the number of threads.
+const PARALLEL: u32 = 1 << 14;
 
 fn lanes_of_left(choices: u32, lanes: usize) -> usize {
     (choices >> (3 * lanes) & 7) as usize
@@ -55,39 +62,58 @@ fn lanes_of_left(choices: u32, lanes: usize) -> usize {
 impl Plan {
     fn new(binary: &Binary, leaf: u32) -> Self {
         let n = binary.nodes.len();
-        let mut plan = Self { sizes: vec![0; n], choices: vec![0; n], leaf };
+        let zeros = || (0..n).map(|_| AtomicU32::new(0)).collect();
+        let plan = Self { sizes: zeros(), choices: zeros(), leaf };
         if n > 0 {
-            plan.costs(binary, 0);
+            plan.costs(binary, 0, 0);
         }
         plan
     }
 
+    fn size(&self, at: u32) -> u32 {
+        self.sizes[at as usize].load(Relaxed)
+    }
+
+    fn choices(&self, at: u32) -> u32 {
+        self.choices[at as usize].load(Relaxed)
+    }
+
+    fn is_leaf(&self, at: u32) -> bool {
+        self.choices(at) & AS_LEAF != 0
+    }
+
     /// The least cost of node `at` in up to 1, 2, … 7 lanes.
-    fn costs(&mut self, binary: &Binary, at: u32) -> [f32; 7] {
+    fn costs(&self, binary: &Binary, at: u32, depth: u32) -> [f32; 7] {
         let node = &binary.nodes[at as usize];
         let area = node.half_area();
         if node.is_leaf() {
             let items = &binary.items[node.first as usize..][..node.count as usize];
-            self.sizes[at as usize] = items.iter().map(Item::count).sum();
-            self.choices[at as usize] = AS_LEAF;
+            self.sizes[at as usize].store(items.iter().map(Item::count).sum(), Relaxed);
+            self.choices[at as usize].store(AS_LEAF, Relaxed);
             return [area; 7];
         }
-        let l = self.costs(binary, node.first);
-        let r = self.costs(binary, node.first + 1);
-        let size = self.sizes[node.first as usize] + self.sizes[node.first as usize + 1];
-        self.sizes[at as usize] = size;
+        let below = |at| self.costs(binary, at, depth + 1);
+        let (l, r) = tasks::join(depth < PARALLEL_DEPTH, || below(node.first), || below(node.first + 1));
+        let size = self.size(node.first) + self.size(node.first + 1);
+        self.sizes[at as usize].store(size, Relaxed);
         let mut choices = 0u32;
         let mut costs = [0.0f32; 9];
-        for lanes in 2..=8usize {
-            let mut best = (f32::INFINITY, 0);
-            for k in 1..lanes {
-                let c = l[k - 1] + r[lanes - k - 1];
-                if c < best.0 {
-                    best = (c, k);
+        if l[6] == l[0] && r[6] == r[0] {
+            // More than one lane each is of no use.
+            choices = 1 << (3 * 2) | 1 << (3 * 8);
+            costs = [l[0] + r[0]; 9];
+        } else {
+            for lanes in 2..=8usize {
+                let mut best = (f32::INFINITY, 0);
+                for k in 1..lanes {
+                    let c = l[k - 1] + r[lanes - k - 1];
+                    if c < best.0 {
+                        best = (c, k);
+                    }
                 }
+                costs[lanes] = best.0;
+                choices |= (best.1 as u32) << (3 * lanes);
             }
-            costs[lanes] = best.0;
-            choices |= (best.1 as u32) << (3 * lanes);
         }
         let inner = costs[8] + area;
         let leaf = if size <= self.leaf { area } else { f32::INFINITY };
@@ -101,12 +127,12 @@ impl Plan {
                 choices &= !(7 << (3 * lanes));
             }
         }
-        self.choices[at as usize] = choices;
+        self.choices[at as usize].store(choices, Relaxed);
         std::array::from_fn(|i| costs[i + 1])
     }
 
     fn expand(&self, nodes: &[Node], at: u32, mut lanes: usize, children: &mut Vec<u32>) {
-        let choices = self.choices[at as usize];
+        let choices = self.choices(at);
         while lanes > 1 && lanes_of_left(choices, lanes) == 0 {
             lanes -= 1;
         }
@@ -120,56 +146,103 @@ impl Plan {
     }
 
     fn collapse(&self, binary: &Binary) -> Built {
-        let mut wide_nodes = vec![WideNode::EMPTY];
-        let (mut objects, mut starts) = (Vec::with_capacity(binary.items.len()), Vec::new());
+        let mut top = Part::default();
+        let mut subtrees = Vec::new();
+        if binary.nodes.is_empty() {
+            top.nodes.push(WideNode::EMPTY);
+        } else {
+            top.fill(self, binary, 0, |child| self.size(child) <= PARALLEL, &mut subtrees);
+        }
+        let parts = tasks::map(subtrees.len(), |i| {
+            let mut part = Part::default();
+            part.fill(self, binary, subtrees[i].0, |_| false, &mut Vec::new());
+            part
+        });
+        let Part { mut nodes, mut objects, mut starts } = top;
+        let total = |length: fn(&Part) -> usize| parts.iter().map(length).sum::<usize>();
+        nodes.reserve_exact(total(|p| p.nodes.len() - 1));
+        objects.reserve_exact(total(|p| p.objects.len()));
+        starts.reserve_exact(total(|p| p.starts.len()) + 1);
+        for (part, &(_, root)) in parts.into_iter().zip(&subtrees) {
+            // Its root has a place among its siblings.
+            let (node, leaf, object) = (nodes.len() as u32 - 1, starts.len() as u32, objects.len() as u32);
+            let mut own = part.nodes.into_iter().map(|mut wide| {
+                wide.renumber(node, leaf);
+                wide
+            });
+            nodes[root as usize] = own.next().expect("a root");
+            nodes.extend(own);
+            objects.extend(part.objects);
+            starts.extend(part.starts.into_iter().map(|s| s + object));
+        }
+        starts.push(objects.len() as u32);
+        Built { tree: Wide { frame: binary.frame, nodes }, objects, starts }
+    }
+}
+
+/// Wide nodes, the first of them the root of the others, and their leaves.
+#[derive(Default)]
+struct Part {
+    nodes: Vec<WideNode>,
+    objects: Vec<u32>,
+    starts: Vec<u32>,
+}
+
+impl Part {
+    /// The tree from the binary node `root` on. Children that `elsewhere` names are not filled but listed, with the numbers
+    /// of their wide nodes.
+    fn fill(
+        &mut self,
+        plan: &Plan,
+        binary: &Binary,
+        root: u32,
+        elsewhere: impl Fn(u32) -> bool,
+        list: &mut Vec<(u32, u32)>,
+    ) {
         let mut children = Vec::new();
         let mut below = Vec::new();
-        let mut work = Vec::new();
-        if !binary.nodes.is_empty() {
-            // (binary node, wide node to fill)
-            work.push((0u32, 0u32));
-        }
+        self.nodes.push(WideNode::EMPTY);
+        // (binary node, wide node to fill)
+        let mut work = vec![(root, 0u32)];
         while let Some((from, to)) = work.pop() {
             children.clear();
-            if self.choices[from as usize] & AS_LEAF != 0 {
+            if plan.is_leaf(from) {
                 children.push(from);
             } else {
-                self.expand(&binary.nodes, from, 8, &mut children);
+                plan.expand(&binary.nodes, from, 8, &mut children);
             }
             // Any-hit queries take the lanes in turn: where there is least to test first.
-            children.sort_by_key(|&c| self.sizes[c as usize]);
+            children.sort_by_key(|&c| plan.size(c));
             let mut wide = WideNode::EMPTY;
             let inner_from = work.len();
             for (lane, &child) in children.iter().enumerate() {
                 let node = &binary.nodes[child as usize];
                 wide.set_box(lane, node.min, node.max);
-                let word = if self.choices[child as usize] & AS_LEAF != 0 {
-                    let number = starts.len() as u32;
-                    starts.push(objects.len() as u32);
+                let word = if plan.is_leaf(child) {
+                    let number = self.starts.len() as u32;
+                    self.starts.push(self.objects.len() as u32);
                     below.push(child);
                     while let Some(i) = below.pop() {
                         let node = &binary.nodes[i as usize];
                         if node.is_leaf() {
-                            let items = &binary.items[node.first as usize..][..node.count as usize];
-                            objects.extend(items.iter().flat_map(Item::objects));
+                            for item in &binary.items[node.first as usize..][..node.count as usize] {
+                                self.objects.extend(item.objects());
+                            }
                         } else {
                             below.extend([node.first + 1, node.first]);
                         }
                     }
                     LEAF | number
                 } else {
-                    let number = wide_nodes.len() as u32;
-                    wide_nodes.push(WideNode::EMPTY);
-                    work.push((child, number));
+                    let number = self.nodes.len() as u32;
+                    self.nodes.push(WideNode::EMPTY);
+                    if elsewhere(child) { &mut *list } else { &mut work }.push((child, number));
                     number
                 };
                 wide.set_child(lane, word);
             }
             work[inner_from..].reverse();
-            wide_nodes[to as usize] = wide;
+            self.nodes[to as usize] = wide;
         }
-        starts.push(objects.len() as u32);
-        wide_nodes.shrink_to_fit();
-        Built { tree: Wide { frame: binary.frame, nodes: wide_nodes }, objects, starts }
     }
 }

@@ -92,17 +92,15 @@ impl Frame {
     }
 }
 
-/// The largest f32 that is not above `x`; −∞ for NaN.
+/// The largest f32 that is not above `x`; −∞ for NaN. Without branches: which way it is rounded cannot be foreseen.
 #[inline(always)]
 pub(crate) fn down(x: f64) -> f32 {
     let f = x as f32;
-    if f64::from(f) <= x {
-        f
-    } else if x.is_nan() {
-        f32::NEG_INFINITY
-    } else {
-        f.next_down()
-    }
+    let bits = f.to_bits() as i32;
+    // The next one towards −∞: one less in magnitude above zero, one more below it.
+    let below = if f == 0.0 { i32::MIN + 1 } else { bits - (bits >> 31 | 1) };
+    let rounded = f32::from_bits(if f64::from(f) > x { below } else { bits } as u32);
+    if x.is_nan() { f32::NEG_INFINITY } else { rounded }
 }
 
 /// The smallest f32 that is not below `x`; ∞ for NaN.

@@ -8,6 +8,7 @@
 use super::build::{self, Node};
 use super::tasks;
 use super::watch::Watch;
+use std::collections::BinaryHeap;
 
 /// Passes after which little is left to gain, and how many nodes, one in so many, look around in each.
 const PASSES: u32 = 6;
@@ -44,8 +45,8 @@ struct Tree<'a> {
     parents: Vec<u32>,
     /// Levels below each node.
     heights: Vec<u8>,
-    /// All nodes but the root and its children.
-    movable: Vec<u32>,
+    /// How many nodes look around in a pass.
+    chosen: usize,
     /// Nodes that this pass has changed.
     touched: Vec<bool>,
 }
@@ -54,50 +55,48 @@ impl<'a> Tree<'a> {
     fn new(nodes: &'a mut [Node]) -> Self {
         let n = nodes.len();
         let (mut parents, mut heights) = (vec![0; n], vec![0u8; n]);
-        let mut down = vec![0u32];
-        let mut at = 0;
-        while at < down.len() {
-            let i = down[at];
-            let node = &nodes[i as usize];
+        let mut count = 0usize;
+        // Children lie after their parents.
+        for (i, node) in nodes.iter().enumerate().rev() {
             if !node.is_leaf() {
-                parents[node.first as usize] = i;
-                parents[node.first as usize + 1] = i;
-                down.extend([node.first, node.first + 1]);
-            }
-            at += 1;
-        }
-        for &i in down.iter().rev() {
-            let node = &nodes[i as usize];
-            if !node.is_leaf() {
-                let below = heights[node.first as usize].max(heights[node.first as usize + 1]);
-                heights[i as usize] = below + 1;
+                let first = node.first as usize;
+                parents[first] = i as u32;
+                parents[first + 1] = i as u32;
+                heights[i] = 1 + heights[first].max(heights[first + 1]);
+                count += 2;
             }
         }
-        let first = down.len().min(3);
-        down.drain(..first);
-        Self { nodes, parents, heights, movable: down, touched: vec![false; n] }
+        // The root's children have nowhere else to go.
+        let chosen = if count > 2 { (count - 2).div_ceil(SHARE) } else { 0 };
+        Self { nodes, parents, heights, chosen, touched: vec![false; n] }
+    }
+
+    /// The largest nodes but for the root and its children. No node is larger than its parent.
+    fn largest(&self) -> Vec<u32> {
+        // Areas are not negative, so their bits sort as they do.
+        let key = |i: u32| u64::from(self.node(i).half_area().to_bits()) << 32 | u64::from(!i);
+        let mut heap = BinaryHeap::from([key(0)]);
+        let mut largest = Vec::with_capacity(self.chosen);
+        while largest.len() < self.chosen
+            && let Some(top) = heap.pop()
+        {
+            let i = !(top as u32);
+            if i != 0 && self.parent(i) != 0 {
+                largest.push(i);
+            }
+            let node = self.node(i);
+            if !node.is_leaf() {
+                heap.extend([key(node.first), key(node.first + 1)]);
+            }
+        }
+        // Neighbours one after the other.
+        largest.sort_unstable();
+        largest
     }
 
     fn pass(&mut self) {
-        if self.movable.is_empty() {
-            return;
-        }
-        let chosen = (self.movable.len() / SHARE).max(1);
-        let moves = {
-            // Areas are not negative, so their bits sort as they do.
-            let key = |&i: &u32| u64::from(!self.nodes[i as usize].half_area().to_bits()) << 32 | u64::from(i);
-            let mut keys: Vec<u64> = self.movable.iter().map(key).collect();
-            if chosen < keys.len() {
-                keys.select_nth_unstable(chosen);
-            }
-            keys.truncate(chosen);
-            // Neighbours one after the other.
-            for key in &mut keys {
-                *key &= 0xffff_ffff;
-            }
-            keys.sort_unstable();
-            tasks::map_with(chosen, Vec::new, |stack, i| self.best_move(keys[i] as u32, stack))
-        };
+        let largest = self.largest();
+        let moves = tasks::map_with(largest.len(), Vec::new, |stack, i| self.best_move(largest[i], stack));
         let mut moves: Vec<Move> = moves.into_iter().filter(|m| m.gain > 0.0).collect();
         moves.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.from.cmp(&b.from)));
         for m in &moves {

@@ -1,6 +1,6 @@
 //! Where a set of boxes is split in two: surface area heuristic over bins (Wald 2007).
 
-use super::build::{Box8, Item};
+use super::build::{Box8, Item, half_area_of};
 use fearless_simd::{Simd, f32x4, prelude::*};
 
 /// Below this depth items are halved by number, which ends within 32 more levels.
@@ -36,7 +36,25 @@ impl<S: Simd, const BINS: usize> Binning<S, BINS> {
     fn bins(&self, item: &Item) -> [usize; 3] {
         let at = (item.middle(self.simd) - self.least) * self.scale;
         let at: [f32; 4] = (at + f32x4::splat(self.simd, TO_INTEGER)).into();
-        [0, 1, 2].map(|axis| at[axis].to_bits() as usize & (BINS - 1))
+        let bin = [at[0].to_bits(), at[1].to_bits(), at[2].to_bits()];
+        [bin[0] as usize & (BINS - 1), bin[1] as usize & (BINS - 1), bin[2] as usize & (BINS - 1)]
+    }
+}
+
+/// What the bins hold, by axis.
+struct Bins<const BINS: usize> {
+    bounds: [[Box8; BINS]; 3],
+    counts: [[u32; BINS]; 3],
+}
+
+impl<const BINS: usize> Bins<BINS> {
+    #[inline(always)]
+    fn put<S: Simd>(&mut self, binning: &Binning<S, BINS>, item: &Item) {
+        let count = item.count();
+        for (axis, bin) in binning.bins(item).into_iter().enumerate() {
+            self.counts[axis][bin] += count;
+            self.bounds[axis][bin].grow(binning.simd, &item.0);
+        }
     }
 }
 
@@ -69,37 +87,39 @@ fn split_in_bins<S: Simd, const BINS: usize>(simd: S, items: &mut [Item], depth:
         return halve(simd, items);
     }
     let binning = Binning::<S, BINS> { simd, least, scale: scale.simd_into(simd) };
-    let mut bounds = [[Box8::EMPTY; BINS]; 3];
-    let mut counts = [[0u32; BINS]; 3];
+    let mut bins = Bins { bounds: [[Box8::EMPTY; BINS]; 3], counts: [[0; BINS]; 3] };
     // From two places in turn: neighbours share a bin, and would wait for each other.
-    let half = items.len().div_ceil(2);
-    for i in 0..items.len() {
-        let item = &items[i / 2 + half * (i % 2)];
-        let count = item.count();
-        for (axis, bin) in binning.bins(item).into_iter().enumerate() {
-            counts[axis][bin] += count;
-            bounds[axis][bin].grow(simd, &item.0);
+    let (first, second) = items.split_at(items.len() / 2);
+    for (a, b) in first.iter().zip(second) {
+        bins.put(&binning, a);
+        bins.put(&binning, b);
+    }
+    if items.len() % 2 == 1 {
+        bins.put(&binning, &second[second.len() - 1]);
+    }
+    let Bins { bounds, counts } = bins;
+    let leaves = |count: u32| ((count + (1 << leaf) - 1) >> leaf) as f32;
+    // The axes beside each other, so that none waits for its own areas.
+    let mut costs = [[0.0f32; BINS]; 3];
+    let (mut b, mut count) = ([Box8::EMPTY.load(simd); 3], [0; 3]);
+    for i in (1..BINS).rev() {
+        for axis in 0..3 {
+            b[axis] = b[axis].min(bounds[axis][i].load(simd));
+            count[axis] += counts[axis][i];
+            costs[axis][i] = half_area_of(b[axis]) * leaves(count[axis]);
         }
     }
-    let leaves = |count: u32| ((count + (1 << leaf) - 1) >> leaf) as f32;
+    let (mut b, mut count) = ([Box8::EMPTY.load(simd); 3], [0; 3]);
+    for i in 1..BINS {
+        for axis in 0..3 {
+            b[axis] = b[axis].min(bounds[axis][i - 1].load(simd));
+            count[axis] += counts[axis][i - 1];
+            costs[axis][i] += half_area_of(b[axis]) * leaves(count[axis]);
+        }
+    }
     let mut best = (f32::INFINITY, 0, 0);
-    for axis in 0..3 {
-        if scale[axis] == 0.0 {
-            continue;
-        }
-        let (bounds, counts) = (&bounds[axis], &counts[axis]);
-        let mut costs = [0.0f32; BINS];
-        let (mut b, mut count) = (Box8::EMPTY, 0);
-        for i in (1..BINS).rev() {
-            b.grow(simd, &bounds[i]);
-            count += counts[i];
-            costs[i] = b.half_area() * leaves(count);
-        }
-        let (mut b, mut count) = (Box8::EMPTY, 0);
-        for i in 1..BINS {
-            b.grow(simd, &bounds[i - 1]);
-            count += counts[i - 1];
-            let cost = b.half_area() * leaves(count) + costs[i];
+    for axis in (0..3).filter(|&axis| scale[axis] != 0.0) {
+        for (i, &cost) in costs[axis].iter().enumerate().skip(1) {
             // The first bin and the last are never empty. Infinite boxes cost infinitely much everywhere.
             if cost < best.0 {
                 best = (cost, axis, i);

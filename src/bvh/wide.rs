@@ -48,6 +48,16 @@ impl WideNode {
     pub(crate) fn set_child(&mut self, lane: usize, child: u32) {
         self.rows[CHILDREN][lane] = f32::from_bits(child);
     }
+
+    /// Nodes are numbered from `node` on, leaves from `leaf` on.
+    pub(crate) fn renumber(&mut self, node: u32, leaf: u32) {
+        for lane in 0..8 {
+            let child = self.child(lane);
+            if child != NONE {
+                self.set_child(lane, child + if child & LEAF != 0 { leaf } else { node });
+            }
+        }
+    }
 }
 
 /// A tree of wide nodes; the root is node 0.
