@@ -108,6 +108,27 @@ fn meshes_are_framed() {
 }
 
 #[test]
+fn the_report_is_written_where_it_is_wanted() {
+    let directory = directory("report");
+    let arguments = ["--kernel", "plane", "--cases", "20", "--rounds", "3", "--out", "here"];
+    let output = run("speed_vs_error", &directory, &arguments);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert_eq!(text(&output.stderr), "", "the progress bar must hide where there is no terminal");
+    assert!(text(&output.stdout).contains("16 of them truehit's, of which 0 break their contract"));
+    assert_eq!(files(&directory), ["here"]);
+    let csv = fs::read_to_string(directory.join("here/speed-vs-error.csv")).unwrap();
+    // Where it comes from, the columns, and 16 families by three kernels.
+    assert_eq!(csv.lines().count(), 2 + 48);
+    let page = fs::read_to_string(directory.join("here/speed-vs-error.md")).unwrap();
+    assert!(page.contains("## Where truehit loses") && page.contains("No row breaks its contract"));
+
+    let directory = self::directory("report-refused");
+    assert_failed(&run("speed_vs_error", &directory, &["--kernel", "torus"]), &directory, "none of plane, triangle");
+    assert_failed(&run("speed_vs_error", &directory, &[]), &directory, "--out DIR");
+    assert_failed(&run("speed_vs_error", &directory, &["--cases", "some"]), &directory, "some");
+}
+
+#[test]
 fn bad_meshes_are_refused_by_line() {
     let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     for (name, content, message) in [

@@ -29,7 +29,8 @@ mod watertight;
 use indicatif::{ProgressBar, ProgressStyle};
 use kernels::Entry;
 use rows::{Row, Sheet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use support::cases::{Family, Kernel};
@@ -42,6 +43,9 @@ const USAGE: &str = "speed_vs_error [--full] [--cases N] [--rounds N] [--kernel 
   --rounds N     timed passes over 2048 rays; medians and quartiles of them [9]
   --kernel NAME  only this shape's kernels (and no plots)
   --out DIR      [docs; with --full see there]";
+
+/// What tests read of this.
+const WORST_CASES: &str = "tests/worst-cases.txt";
 
 struct Options {
     cases: usize,
@@ -60,7 +64,13 @@ fn options() -> Result<Options, lexopt::Error> {
             Arg::Long("full") => (o.full, o.cases) = (true, 20_000),
             Arg::Long("cases") => o.cases = parser.value()?.parse::<usize>()?.max(20),
             Arg::Long("rounds") => o.rounds = parser.value()?.parse::<usize>()?.max(3),
-            Arg::Long("kernel") => o.kernel = Some(parser.value()?.string()?),
+            Arg::Long("kernel") => {
+                let (name, names) = (parser.value()?.string()?, Kernel::ALL.map(Kernel::name));
+                if !names.contains(&name.as_str()) {
+                    return Err(format!("{name:?} is none of {}", names.join(", ")).into());
+                }
+                o.kernel = Some(name);
+            }
             Arg::Long("out") => o.out = Some(parser.value()?.into()),
             Arg::Short('h') | Arg::Long("help") => {
                 println!("{USAGE}");
@@ -77,9 +87,29 @@ fn timed(kernel: Kernel) -> usize {
     if kernel == Kernel::Mesh { 256 } else { 2048 }
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<(), Box<dyn std::error::Error>> {
     let (started, machine) = (std::time::Instant::now(), page::machine());
-    let options = options().map_err(|e| format!("{e}\n{USAGE}"))?;
+    let options = options()?;
+    // Only whole runs with nothing said about where they go leave traces in the repository.
+    let kept = options.out.is_none() && options.kernel.is_none();
+    if kept && !Path::new(WORST_CASES).exists() {
+        return Err("run this in the repository, or say where to write: --out DIR".into());
+    }
+    let out = options.out.clone().unwrap_or_else(|| match (options.kernel.is_none(), options.full) {
+        (true, false) => "docs".into(),
+        (true, true) => "target/speed-vs-error-full".into(),
+        (false, _) => "target/speed-vs-error".into(),
+    });
     let entries = table::all();
     let wanted = |kernel: Kernel| options.kernel.as_ref().is_none_or(|k| k == kernel.name());
     let families: Vec<_> = support::families::all().into_iter().filter(|f| wanted(f.kernel)).collect();
@@ -101,13 +131,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sieves = if wanted(Kernel::Mesh) { watertight::all(options.cases) } else { Vec::new() };
     bar.inc(1);
 
-    // Only whole runs with nothing said about where they go leave traces in the repository.
-    let kept = options.out.is_none() && options.kernel.is_none();
-    let out = options.out.unwrap_or_else(|| match (options.kernel.is_none(), options.full) {
-        (true, false) => "docs".into(),
-        (true, true) => "target/speed-vs-error-full".into(),
-        (false, _) => "target/speed-vs-error".into(),
-    });
     std::fs::create_dir_all(out.join("pictures"))?;
     if options.kernel.is_none() {
         let n = if options.full { 200 } else { 24 };
@@ -146,7 +169,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         std::fs::write(page::FULL_CSV, &csv)?;
     }
     if kept && !options.full {
-        std::fs::write("tests/worst-cases.txt", tables::worst_cases(&rows))?;
+        std::fs::write(WORST_CASES, tables::worst_cases(&rows))?;
         readme::update(&page)?;
     }
     std::fs::write(out.join("speed-vs-error.csv"), csv)?;
