@@ -29,8 +29,8 @@ impl Aftermath {
     pub fn of(entry: &Entry, sheet: &Sheet, n: usize) -> Self {
         let mut out = Self::default();
         for (i, (case, truth)) in sheet.cases.iter().zip(&sheet.truths).enumerate().take(n) {
-            let Some(truth) = truth else { continue };
-            out.add(entry, case, truth, i as u64);
+            let (Some(truth), Some(exact)) = (truth, &sheet.exact[i]) else { continue };
+            out.add(entry, case, truth, &exact.lo, i as u64);
         }
         out.points.sort_by(f64::total_cmp);
         out.normals.sort_by(f64::total_cmp);
@@ -47,7 +47,7 @@ impl Aftermath {
         self.rehits += other.rehits;
     }
 
-    fn add(&mut self, entry: &Entry, case: &Case, truth: &Truth, seed: u64) {
+    fn add(&mut self, entry: &Entry, case: &Case, truth: &Truth, lambda: &Big, seed: u64) {
         let shipped = entry.origin == Origin::Shipped;
         let size = largest(&case.solid).max(case.ray.origin.abs().max_element());
         // Figures in floats: the ends of their range are left to λ.
@@ -64,9 +64,8 @@ impl Aftermath {
         if !truth.parts.contains(&hit.part) || !hit.lambda.is_finite() {
             return;
         }
-        let lambda = truth.lambda.enclosure().lo;
         let exact_point = Big3(std::array::from_fn(|k| {
-            &Big::from(case.ray.origin[k]) + &(&lambda * &Big::from(case.ray.direction[k]))
+            &Big::from(case.ray.origin[k]) + &(lambda * &Big::from(case.ray.direction[k]))
         }));
         let Some(exact_normal) = normal_at(&case.solid, &exact_point, hit.part) else { return };
         let (point, bound, normal) = if shipped {

@@ -3,7 +3,6 @@
 use crate::kernels::{Entry, Origin};
 use crate::rows::{Row, Sheet};
 use crate::support::cases::{Case, Kernel};
-use crate::support::oracle;
 use crate::svg::{Axis, COLOURS, Mark, Panel, Svg, legend, power_of_ten};
 use crate::sweeps;
 
@@ -102,11 +101,11 @@ fn curves(svg: &mut Svg, panel: &Panel, entries: &[Entry], values: &[f64], n: u6
     let mut lines: Vec<Vec<(f64, f64)>> = vec![Vec::new(); entries.len()];
     for &value in values {
         let cases: Vec<Case> = (0..n).map(|seed| make(value, seed)).collect();
-        let truths: Vec<_> = cases.iter().map(oracle::truth).collect();
+        let sheet = Sheet::of(cases);
         for (entry, line) in entries.iter().zip(&mut lines) {
-            let point = sweeps::point(entry, &cases, &truths);
+            let point = sweeps::point(entry, &sheet);
             // Of a few hits the largest error says little.
-            if 4 * point.hits < truths.iter().flatten().count() {
+            if 4 * point.hits < sheet.hits() {
                 line.push((f64::NAN, f64::NAN));
                 continue;
             }
@@ -290,8 +289,7 @@ pub fn heat(entries: &[Entry], n: u64) -> String {
                         let cases: Vec<Case> = (0..n)
                             .map(|seed| sweeps::from_distance(kernel, 10f64.powi(s), 10f64.powi(d), 1.1, seed))
                             .collect();
-                        let truths = cases.iter().map(oracle::truth).collect();
-                        Sheet { cases, truths }
+                        Sheet::of(cases)
                     })
                     .collect()
             })
@@ -301,7 +299,7 @@ pub fn heat(entries: &[Entry], n: u64) -> String {
             svg.text(left + cell * 6.5, top - 8.0, &format!("{}: {}", kernel.name(), entry.name), "middle", "");
             for (j, row) in grid.iter().enumerate() {
                 for (i, sheet) in row.iter().enumerate() {
-                    let wrong = sweeps::point(entry, &sheet.cases, &sheet.truths).wrong;
+                    let wrong = sweeps::point(entry, sheet).wrong;
                     shade(&mut svg, (left + i as f64 * cell, top + (12 - j) as f64 * cell), cell - 1.0, wrong);
                 }
             }

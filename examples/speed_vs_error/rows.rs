@@ -2,6 +2,7 @@
 
 use crate::aftermath::Aftermath;
 use crate::kernels::{Answer, Entry, Origin};
+use crate::support::big::Enclosure;
 use crate::support::cases::{Case, Family, Kernel, Solid};
 use crate::support::measure;
 use crate::support::oracle::{self, Truth};
@@ -13,13 +14,19 @@ use truehit::kernel::tally::Tally;
 pub struct Sheet {
     pub cases: Vec<Case>,
     pub truths: Vec<Option<Truth>>,
+    /// The exact λ of the hits, to 250 bits.
+    pub exact: Vec<Option<Enclosure>>,
 }
 
 impl Sheet {
     pub fn new(family: &Family, n: usize) -> Self {
-        let cases = cases(family, n);
-        let truths = cases.iter().map(oracle::truth).collect();
-        Self { cases, truths }
+        Self::of(cases(family, n))
+    }
+
+    pub fn of(cases: Vec<Case>) -> Self {
+        let truths: Vec<_> = cases.iter().map(oracle::truth).collect();
+        let exact = truths.iter().map(|t| Some(t.as_ref()?.lambda.enclosure())).collect();
+        Self { cases, truths, exact }
     }
 
     pub fn hits(&self) -> usize {
@@ -74,7 +81,7 @@ pub struct Accuracy {
 impl Accuracy {
     pub fn of(entry: &Entry, sheet: &Sheet) -> Self {
         let mut a = Self::default();
-        for (case, truth) in sheet.cases.iter().zip(&sheet.truths) {
+        for (i, (case, truth)) in sheet.cases.iter().zip(&sheet.truths).enumerate() {
             let Some((answer, tally)) = entry.counted(case) else {
                 a.refused += 1;
                 continue;
@@ -99,9 +106,9 @@ impl Accuracy {
                     if has_parts(&case.solid) && !truth.parts.contains(&hit.part) {
                         a.wrong_parts += 1;
                     }
-                    let exact = truth.lambda.enclosure();
+                    let exact = sheet.exact[i].as_ref().expect("a hit's λ");
                     let scale = measure::scale(case);
-                    let m = measure::measure(hit, &exact, scale);
+                    let m = measure::measure(hit, exact, scale);
                     a.violations += usize::from(m.violated);
                     if m.tightness.is_finite() && m.tightness > 0.0 {
                         a.tightness.push(m.tightness);

@@ -1,9 +1,9 @@
 //! Rays along one parameter: distance, grazing angle, scale.
 
 use crate::kernels::Entry;
+use crate::rows::Sheet;
 use crate::support::cases::{Case, Kernel, Solid};
 use crate::support::measure;
-use crate::support::oracle;
 use crate::support::rng::Rng;
 use truehit::glam::DVec3;
 
@@ -87,12 +87,12 @@ pub struct Point {
 }
 
 /// One kernel over the cases.
-pub fn point(entry: &Entry, cases: &[Case], truths: &[Option<oracle::Truth>]) -> Point {
+pub fn point(entry: &Entry, sheet: &Sheet) -> Point {
     let (mut ulps, mut wrong) = (Vec::new(), 0);
-    for (case, truth) in cases.iter().zip(truths) {
-        match (truth, entry.answer(case).flatten()) {
-            (Some(truth), Some(hit)) => {
-                let m = measure::measure(&hit, &truth.lambda.enclosure(), measure::scale(case));
+    for (case, exact) in sheet.cases.iter().zip(&sheet.exact) {
+        match (exact, entry.answer(case).flatten()) {
+            (Some(exact), Some(hit)) => {
+                let m = measure::measure(&hit, exact, measure::scale(case));
                 ulps.push(if m.ulps.is_nan() { f64::INFINITY } else { m.ulps });
             }
             (None, None) => {}
@@ -101,5 +101,5 @@ pub fn point(entry: &Entry, cases: &[Case], truths: &[Option<oracle::Truth>]) ->
     }
     let hits = ulps.len();
     let max = ulps.into_iter().reduce(f64::max).unwrap_or(f64::NAN);
-    Point { hits, max, wrong: f64::from(wrong) / cases.len() as f64 }
+    Point { hits, max, wrong: f64::from(wrong) / sheet.cases.len() as f64 }
 }
