@@ -64,6 +64,7 @@ pub fn machine() -> String {
 /// All families of one kernel, summed.
 pub struct Sum {
     pub cases: usize,
+    pub truth_hits: usize,
     pub wrong: usize,
     pub edges: usize,
     pub parts: usize,
@@ -98,6 +99,7 @@ impl Page<'_> {
         times.sort_by(f64::total_cmp);
         Sum {
             cases: rows().map(|r| r.accuracy.answered).sum(),
+            truth_hits: rows().map(|r| r.truth_hits).sum(),
             wrong: rows().map(|r| r.accuracy.wrong()).sum(),
             edges: rows().map(|r| r.accuracy.edges).sum(),
             parts: rows().map(|r| r.accuracy.wrong_parts).sum(),
@@ -177,8 +179,8 @@ impl Page<'_> {
             "## In short\n\n\
              *ordinary*: ns a ray on ordinary rays, independent / each waiting for the last. *hard*: the median family's\n\
              ns. Errors and counts over all families, most of them hard; ppm: per million.\n\n\
-             | kernel | | ordinary, ns | hard, ns | λ ulp p99 | max | wrong hit or miss, ppm | wrong part, ppm | bound broken, ppm | fast path left, ppm |\n\
-             |---|---|---:|---:|---:|---:|---:|---:|---:|---:|\n",
+             | kernel | | n (hits) | ordinary, ns | hard, ns | λ ulp p99 | max | wrong hit or miss, ppm | wrong part, ppm | bound broken, ppm | fast path left, ppm |\n\
+             |---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
         );
         for (kernel, names) in self.kernels() {
             for (name, origin) in names {
@@ -194,8 +196,10 @@ impl Page<'_> {
                 let edges = if s.edges > 0 { "¹" } else { "" };
                 let _ = writeln!(
                     out,
-                    "| {} | {bold}{name}{bold} | {ordinary} | {} | {} | {} | {}{edges} | {} | {bound} | {} |",
+                    "| {} | {bold}{name}{bold} | {} ({}) | {ordinary} | {} | {} | {} | {}{edges} | {} | {bound} | {} |",
                     kernel.name(),
+                    s.cases,
+                    s.truth_hits,
                     ns(s.hard),
                     ulps(quantile(&s.ulps, 0.99)),
                     ulps(s.ulps.last().copied()),
