@@ -325,7 +325,8 @@ impl Page<'_> {
         }
         let _ = write!(
             out,
-            "Neither the fastest nor exact (all decided rightly, each λ the nearest float): {} of {} rows.\n\n\
+            "Neither the fastest nor exact (all decided rightly, each λ the nearest float): {} of {} rows. A box is passed\n\
+             through: its decision is exact, its λ are rounded quotients. Under a map λ is corrected, then rounded again.\n\n\
              | kernel | family | ns | largest λ error, ulp | wrong | fastest | its ns | its λ error | wrong |\n\
              |---|---|---:|---:|---:|---|---:|---:|---:|\n",
             rows.len(),
