@@ -23,7 +23,7 @@ mod wide;
 
 pub use level::Level;
 
-pub(crate) use bundle::{Bundle, Eight, RAYS};
+pub(crate) use bundle::{Bundle, RAYS, Together, together};
 pub(crate) use collapse::build;
 pub(crate) use frame::Frame;
 pub(crate) use slab::{Limits, LocalRay, PLAIN_ERROR, Sure};

@@ -7,7 +7,7 @@
 use super::frame::Frame;
 use crate::kernel::float::power;
 use crate::{Interval, Ray};
-use fearless_simd::{Simd, f32x4, f64x2, prelude::*};
+use fearless_simd::{Simd, f32x4, f32x8, f64x2, f64x4, prelude::*};
 use glam::DVec3;
 
 /// A ray in the frame of a tree, with what the box and leaf tests need of it: `origin` + t·`direction`.
@@ -45,7 +45,7 @@ pub(crate) struct Limits {
 }
 
 /// Margin of a box test, relative to 1 + |origin|: eight roundings of f32 (six are needed: §10).
-const SLAB: f32 = 8.0 / 16_777_216.0;
+pub(super) const SLAB: f32 = 8.0 / 16_777_216.0;
 
 /// Slack of a limit at or near zero. Nothing in a tree of width 1 is that small, and products with it stay clear of the
 /// subnormals, whose arithmetic costs a hundred times as much.
@@ -56,6 +56,9 @@ pub(super) const NEAR: f32 = 4.0;
 
 /// Directions in the frame whose largest coordinate is beyond these are first scaled.
 pub(super) const LENGTHS: [f32; 2] = [1.0 / 1_099_511_627_776.0, 1_099_511_627_776.0]; // 2^±40
+
+/// [`Placed::steepest`] of a ray that is taken as it is.
+pub(super) const STEEPEST: f32 = LENGTHS[1] * LENGTHS[1];
 
 /// [`LocalRay::origin_error`] of a ray that is taken as it is: 4u are needed.
 pub(crate) const PLAIN_ERROR: f32 = 8.0 * f64::EPSILON as f32;
@@ -85,7 +88,7 @@ impl LocalRay {
             origin: [(pair(o.x, o.y) - pair(c.x, c.y)) * frame.scale, (pair(o.z, 0.0) - pair(c.z, 0.0)) * frame.scale],
             direction: [pair(d.x, d.y) * frame.scale, pair(d.z, 0.0) * frame.scale],
             error: PLAIN_ERROR,
-            steepest: LENGTHS[1] * LENGTHS[1],
+            steepest: STEEPEST,
             limits: Limits::PLAIN,
         };
         let (mut origin, mut direction) = placed.narrowed();
@@ -128,27 +131,15 @@ impl Limits {
     /// t = λ.
     pub(crate) const PLAIN: Self = Self { stretch: 1.0, advance: 0.0 };
 
-    /// Not below the t of `lambda`.
+    /// Not below the t of `lambda`: λ·stretch − advance. One addition covers the roundings of both precisions; what matters near
+    /// the tree is far below the limit of 2¹⁰⁰, which keeps infinities out of the sums.
     #[inline(always)]
     pub(crate) fn upper(&self, lambda: f64) -> f32 {
-        self.upper_of(lambda, self.advance)
-    }
-
-    /// Not above the t of `lambda`.
-    #[inline(always)]
-    pub(crate) fn lower(&self, lambda: f64) -> f32 {
-        -self.upper_of(-lambda, -self.advance)
-    }
-
-    /// Not below λ·stretch − advance. One addition covers the roundings of both precisions; what matters near the tree
-    /// is far below the limit of 2¹⁰⁰, which keeps infinities out of the sums.
-    #[inline(always)]
-    fn upper_of(&self, lambda: f64, advance: f64) -> f32 {
         let t = lambda * self.stretch;
         let t = if t > FARTHEST_T { FARTHEST_T } else { t };
         let t = if t < -FARTHEST_T { -FARTHEST_T } else { t };
-        let slack = (t.abs() + advance.abs()) * f64::EPSILON + TINY;
-        let t = t - advance;
+        let slack = (t.abs() + self.advance.abs()) * f64::EPSILON + TINY;
+        let t = t - self.advance;
         ((t + slack) + t.abs() * NARROWING) as f32
     }
 
@@ -165,6 +156,16 @@ impl Limits {
     }
 }
 
+/// The least and the greatest t of eight λ, t = λ: as [`Limits::of`].
+#[inline(always)]
+pub(super) fn plain_ends<S: Simd>(simd: S, lambda: [f64x4<S>; 2]) -> [f32x8<S>; 2] {
+    let (farthest, tiny) = (f64x4::splat(simd, FARTHEST_T), f64x4::splat(simd, TINY));
+    let [a, b] = [lambda[0].min(farthest).max(-farthest), lambda[1].min(farthest).max(-farthest)];
+    let relative = f64x4::splat(simd, f64::EPSILON + NARROWING);
+    let [of_a, of_b] = [a.abs() * relative + tiny, b.abs() * relative + tiny];
+    [(a - of_a).relaxed_narrow(b - of_b), (a + of_a).relaxed_narrow(b + of_b)]
+}
+
 /// Beyond this limits are all alike.
 const FARTHEST_T: f64 = power(100);
 
@@ -174,16 +175,11 @@ const NARROWING: f64 = power(-23);
 /// What is certainly inside an interval: limits of t rounded inward.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sure {
-    min: f32,
-    max: f32,
+    pub(super) min: f32,
+    pub(super) max: f32,
 }
 
 impl Sure {
-    #[inline(always)]
-    pub(crate) fn new(limits: Limits, within: Interval) -> Self {
-        Self { min: limits.upper(within.min), max: limits.lower(within.max) }
-    }
-
     /// Whether a t between these is inside for certain; not if one is NaN.
     #[inline(always)]
     pub(crate) fn holds(self, [low, high]: [f32; 2]) -> bool {

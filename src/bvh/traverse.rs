@@ -7,33 +7,27 @@ use super::slab::LocalRay;
 use super::wide::{CHILDREN, LEAF, NONE, Wide, WideNode};
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-/// What is left to visit: children, each with the t where its box begins. Kept in a fixed array; what does not fit,
-/// which no sensible tree needs, goes to the heap.
-struct Stack {
-    /// t's bits above the child's. As integers they sort as t does, which is ≥ 0 in all but odd intervals; there the
-    /// order is worse and nothing else.
-    entries: [u64; Stack::ROOM],
+/// What is left to visit, each with the t where its box begins in the highest bits. As integers they sort as t does, which is
+/// ≥ 0 in all but odd intervals; there the order is worse and nothing else. Kept in a fixed array; what does not fit, which
+/// no sensible tree needs, goes to the heap.
+pub(super) struct Stack<E> {
+    entries: [E; ROOM],
     len: usize,
-    spilled: Vec<u64>,
+    spilled: Vec<E>,
 }
 
-impl Stack {
-    const ROOM: usize = 32;
+const ROOM: usize = 32;
 
+impl<E: Copy + Default + Ord> Stack<E> {
     #[inline(always)]
-    fn new() -> Self {
-        Self { entries: [0; Self::ROOM], len: 0, spilled: Vec::new() }
-    }
-
-    #[inline(always)]
-    fn entry(child: u32, t: f32) -> u64 {
-        u64::from(t.to_bits()) << 32 | u64::from(child)
+    pub(super) fn new() -> Self {
+        Self { entries: [E::default(); ROOM], len: 0, spilled: Vec::new() }
     }
 
     /// Room for eight more.
     #[inline(always)]
-    fn reserve(&mut self) {
-        if self.len > Self::ROOM - 8 {
+    pub(super) fn reserve(&mut self) {
+        if self.len > ROOM - 8 {
             self.spill();
         }
     }
@@ -46,47 +40,42 @@ impl Stack {
     }
 
     #[inline(always)]
-    fn push(&mut self, entry: u64) {
-        self.entries[self.len & (Self::ROOM - 1)] = entry;
+    fn push(&mut self, entry: E) {
+        self.entries[self.len & (ROOM - 1)] = entry;
         self.len += 1;
     }
 
     /// Pushes below all of the last `count` that are nearer.
     #[inline(always)]
-    fn insert(&mut self, entry: u64, count: usize) {
+    pub(super) fn insert(&mut self, entry: E, count: usize) {
         let mut at = self.len;
-        while at > self.len - count && self.entries[(at - 1) & (Self::ROOM - 1)] < entry {
-            self.entries[at & (Self::ROOM - 1)] = self.entries[(at - 1) & (Self::ROOM - 1)];
+        while at > self.len - count && self.entries[(at - 1) & (ROOM - 1)] < entry {
+            self.entries[at & (ROOM - 1)] = self.entries[(at - 1) & (ROOM - 1)];
             at -= 1;
         }
-        self.entries[at & (Self::ROOM - 1)] = entry;
+        self.entries[at & (ROOM - 1)] = entry;
         self.len += 1;
     }
 
     #[inline(always)]
-    fn pop(&mut self) -> Option<(u32, f32)> {
-        let entry = if self.len == 0 {
-            if self.spilled.is_empty() {
-                return None;
-            }
-            self.spilled.pop()?
-        } else {
-            self.len -= 1;
-            self.entries[self.len & (Self::ROOM - 1)]
-        };
-        Some((entry as u32, f32::from_bits((entry >> 32) as u32)))
+    pub(super) fn pop(&mut self) -> Option<E> {
+        if self.len == 0 {
+            return if self.spilled.is_empty() { None } else { self.spilled.pop() };
+        }
+        self.len -= 1;
+        Some(self.entries[self.len & (ROOM - 1)])
     }
+}
+
+/// A child, and the t where its box begins.
+#[inline(always)]
+fn entry(child: u32, t: f32) -> u64 {
+    u64::from(t.to_bits()) << 32 | u64::from(child)
 }
 
 #[inline(always)]
 fn spread<S: Simd>(simd: S, v: &[f32; 4]) -> [f32x8<S>; 3] {
     [f32x8::splat(simd, v[0]), f32x8::splat(simd, v[1]), f32x8::splat(simd, v[2])]
-}
-
-/// What is walked with: a ray, or many.
-pub(crate) trait Beam<S: Simd> {
-    /// Which of the node's boxes may be met before `t_max`, and from which t on.
-    fn test(&self, simd: S, node: &WideNode, t_max: f32) -> (u32, f32x8<S>);
 }
 
 /// The ray's constants in every lane.
@@ -110,9 +99,8 @@ impl<S: Simd> Lanes<S> {
             near: [ray.away & 1, 2 + (ray.away >> 1 & 1), 4 + (ray.away >> 2 & 1)],
         }
     }
-}
 
-impl<S: Simd> Beam<S> for Lanes<S> {
+    /// Which of the node's boxes may be met before `t_max`, and from which t on.
     #[inline(always)]
     fn test(&self, simd: S, node: &WideNode, t_max: f32) -> (u32, f32x8<S>) {
         let [inv, near, far] = [&self.inv, &self.near_shift, &self.far_shift];
@@ -145,23 +133,17 @@ pub(crate) trait Any<S: Simd> {
     fn leaf(&mut self, simd: S, leaf: u32) -> bool;
 }
 
-/// Visits the leaves whose boxes `beam` meets before `t_max`, nearest first.
+/// Visits the leaves whose boxes `ray` meets before `t_max`, nearest first.
 #[inline(always)]
-pub(crate) fn closest<S: Simd>(
-    simd: S,
-    tree: &Wide,
-    beam: &impl Beam<S>,
-    mut t_max: f32,
-    leaves: &mut impl Closest<S>,
-) {
+pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: f32, leaves: &mut impl Closest<S>) {
     let nodes = &tree.nodes[..];
-    let mut stack = Stack::new();
+    let mut stack = Stack::<u64>::new();
     let mut at = 0u32;
     loop {
         // Down to a leaf, or to nothing.
         while at & LEAF == 0 {
             let node = &nodes[at as usize];
-            let (mut hits, enter) = beam.test(simd, node, t_max);
+            let (mut hits, enter) = ray.test(simd, node, t_max);
             if hits == 0 {
                 at = NONE;
                 break;
@@ -177,7 +159,7 @@ pub(crate) fn closest<S: Simd>(
             stack.reserve();
             let second = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
-            let (a, b) = (Stack::entry(child(first), enter[first]), Stack::entry(child(second), enter[second]));
+            let (a, b) = (entry(child(first), enter[first]), entry(child(second), enter[second]));
             let (nearer, farther) = if a < b { (a, b) } else { (b, a) };
             stack.push(farther);
             if hits == 0 {
@@ -189,35 +171,35 @@ pub(crate) fn closest<S: Simd>(
             while hits != 0 {
                 let i = hits.trailing_zeros() as usize & 7;
                 hits &= hits - 1;
-                stack.insert(Stack::entry(child(i), enter[i]), count);
+                stack.insert(entry(child(i), enter[i]), count);
                 count += 1;
             }
-            let Some((child, _)) = stack.pop() else { return };
-            at = child;
+            let Some(nearest) = stack.pop() else { return };
+            at = nearest as u32;
         }
         if at != NONE {
             t_max = leaves.leaf(simd, at & !LEAF);
         }
         loop {
-            let Some((child, t)) = stack.pop() else { return };
-            if t <= t_max {
-                at = child;
+            let Some(next) = stack.pop() else { return };
+            if f32::from_bits((next >> 32) as u32) <= t_max {
+                at = next as u32;
                 break;
             }
         }
     }
 }
 
-/// Visits the leaves whose boxes `beam` meets before `t_max`, in the nodes' fixed order, until one holds a hit.
+/// Visits the leaves whose boxes `ray` meets before `t_max`, in the nodes' fixed order, until one holds a hit.
 #[inline(always)]
-pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, beam: &impl Beam<S>, t_max: f32, leaves: &mut impl Any<S>) -> bool {
+pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, t_max: f32, leaves: &mut impl Any<S>) -> bool {
     let nodes = &tree.nodes[..];
-    let mut stack = Stack::new();
+    let mut stack = Stack::<u64>::new();
     let mut at = 0u32;
     loop {
         while at & LEAF == 0 {
             let node = &nodes[at as usize];
-            let (mut hits, _) = beam.test(simd, node, t_max);
+            let (mut hits, _) = ray.test(simd, node, t_max);
             let child: [f32; 8] = node.row(simd, CHILDREN as u32).into();
             let child = |lane: usize| child[lane & 7].to_bits();
             if hits == 0 {
@@ -238,7 +220,7 @@ pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, beam: &impl Beam<S>, t_max: f32
         if at != NONE && leaves.leaf(simd, at & !LEAF) {
             return true;
         }
-        let Some((child, _)) = stack.pop() else { return false };
-        at = child;
+        let Some(next) = stack.pop() else { return false };
+        at = next as u32;
     }
 }

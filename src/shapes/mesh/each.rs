@@ -2,9 +2,9 @@
 //! are those of each ray alone.
 
 use super::Mesh;
-use super::leaf::{Leaf, Outcome, Thick, Vec8, filter, load};
+use super::leaf::{Leaf, Margins, everywhere, filter};
 use super::query::{self, Nearest, occluded};
-use crate::bvh::{self, Bundle, Eight, Limits, RAYS, Sure};
+use crate::bvh::{self, Bundle, Limits, RAYS, Sure};
 use crate::{Hit, Interval, Ray};
 use fearless_simd::{Simd, dispatch, f32x8, prelude::*};
 
@@ -69,59 +69,53 @@ fn go_together(rays: &[Stretch; RAYS]) -> bool {
     [5, 10, 15].iter().all(|&i| (rays[i].0.direction - first).abs().max_element() <= close)
 }
 
-/// A bundle in which more triangles than this are in question for some ray is too wide for its mesh: the rays are faster
-/// alone.
-const MOST_TRIANGLES: u32 = 80;
-
 /// What all rays of a bundle have in common.
-struct Common<S: Simd> {
-    thick: Thick<S>,
-    /// The ends of what matters are kept up to date: −∞ for a ray that has its answer.
-    rays: [Eight; RAYS / 8],
-    tested: u32,
+struct Common<'a> {
+    mesh: &'a Mesh,
+    bundle: Bundle,
+    margins: Margins,
 }
 
-impl<S: Simd> Common<S> {
+impl<'a> Common<'a> {
     #[inline(always)]
-    fn new(simd: S, bundle: &Bundle) -> Self {
-        let mut common = Self { thick: Thick::new(simd, bundle), rays: bundle.rays, tested: 0 };
-        let reach = f32x8::splat(simd, common.thick.reach);
-        for eight in &mut common.rays {
+    fn new<S: Simd>(simd: S, mesh: &'a Mesh, mut bundle: Bundle) -> Self {
+        let (margins, reach) = Margins::of_bundle(&bundle);
+        let reach = f32x8::splat(simd, reach);
+        for eight in &mut bundle.rays {
             let (t_min, t_max): (f32x8<S>, f32x8<S>) = (eight.t_min.simd_into(simd), eight.t_max.simd_into(simd));
             (eight.t_min, eight.t_max) = (t_min.max(-reach).into(), t_max.min(reach).into());
         }
-        common
+        Self { mesh, bundle, margins }
     }
 
-    fn too_wide(&self) -> bool {
-        self.tested > MOST_TRIANGLES
-    }
-
-    /// Calls `each` for every triangle and eight rays of which some may meet it, until it answers no.
+    /// Calls `each` for every triangle of the leaf that one of `rays` may meet: with the triangle's lane, the ray, whether its line
+    /// certainly passes through, and the interval of t. It is given, and answers with, the t from which on nothing matters
+    /// to the ray.
     #[inline(always)]
-    fn visit(
+    fn visit<S: Simd>(
         &mut self,
         simd: S,
         leaf: &Leaf,
-        exact: bool,
-        mut each: impl FnMut(&mut [f32; 8], u32, usize, &Outcome) -> bool,
+        mut rays: u32,
+        mut each: impl FnMut(usize, usize, bool, [f32; 2], f32) -> f32,
     ) {
-        let mut triangles = self.thick.test(simd, &leaf.triangles(simd, exact));
-        self.tested += triangles.count_ones();
-        while triangles != 0 {
-            let lane = triangles.trailing_zeros();
-            triangles &= triangles - 1;
-            let triangle = leaf.triangle(simd, lane as usize, exact);
-            for (i, eight) in self.rays.iter_mut().enumerate() {
-                let ray: [Vec8<S>; 2] = [load(simd, &eight.origin), load(simd, &eight.direction)];
-                let stretch = [eight.t_min.simd_into(simd), eight.t_max.simd_into(simd)];
-                if let Some(outcome) = filter(simd, &triangle, ray, &self.thick.margins, stretch)
-                    && !each(&mut eight.t_max, lane, 8 * i, &outcome)
-                {
-                    return;
-                }
+        let triangles = leaf.triangles(simd, self.mesh.exact);
+        while rays != 0 {
+            let ray = rays.trailing_zeros() as usize & 15;
+            rays &= rays - 1;
+            let (eight, at) = (&mut self.bundle.rays[ray / 8], ray % 8);
+            let [o, d] = [everywhere(simd, &eight.origin, at), everywhere(simd, &eight.direction, at)];
+            let stretch = [f32x8::splat(simd, eight.t_min[at]), f32x8::splat(simd, eight.t_max[at])];
+            let Some(outcome) = filter(simd, &triangles, [o, d], &self.margins, stretch) else { continue };
+            let mut lanes = outcome.maybe;
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize & 7;
+                lanes &= lanes - 1;
+                let (through, depth) = (outcome.through >> lane & 1 == 1, outcome.depths.interval(lane));
+                eight.t_max[at] = each(lane, ray, through, depth, eight.t_max[at]);
             }
         }
+        self.bundle.shorten(simd);
     }
 }
 
@@ -129,26 +123,15 @@ impl<S: Simd> Common<S> {
 #[inline(always)]
 fn closest_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mut [Option<Hit>; RAYS]) -> bool {
     let Some(bundle) = Bundle::new(simd, mesh.frame(), rays) else { return false };
-    let mut walk = Together {
-        mesh,
-        common: Common::new(simd, &bundle),
+    let mut walk = Nearests {
         nearest: std::array::from_fn(|i| {
             let (ray, within) = &rays[i];
-            Nearest::new(
-                mesh,
-                ray,
-                *within,
-                Limits::PLAIN,
-                Sure::new(Limits::PLAIN, *within),
-                bundle.rays[i / 8].t_max[i % 8],
-            )
+            let eight = &bundle.rays[i / 8];
+            Nearest::new(mesh, ray, *within, Limits::PLAIN, eight.sure(i % 8), eight.t_max[i % 8])
         }),
-        t_max: bundle.t_max,
+        common: Common::new(simd, mesh, bundle),
     };
-    bvh::closest(simd, &mesh.tree, &bundle.lanes(simd), bundle.t_max, &mut walk);
-    if walk.common.too_wide() {
-        return false;
-    }
+    bvh::together(simd, &mesh.tree, &mut walk);
     for (hit, nearest) in hits.iter_mut().zip(&mut walk.nearest) {
         nearest.settle(simd, hit);
     }
@@ -156,51 +139,29 @@ fn closest_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mu
 }
 
 /// A bundle's walk to the nearest hits.
-struct Together<'a, S: Simd> {
-    mesh: &'a Mesh,
-    common: Common<S>,
+struct Nearests<'a> {
+    common: Common<'a>,
     nearest: [Nearest<'a>; RAYS],
-    /// The largest t that matters to one of them.
-    t_max: f32,
 }
 
-impl<S: Simd> bvh::Closest<S> for Together<'_, S> {
+impl<S: Simd> bvh::Together<S> for Nearests<'_> {
     #[inline(always)]
-    fn leaf(&mut self, simd: S, leaf: u32) -> f32 {
-        self.visit(simd, leaf);
-        // Nothing matters to a bundle that is given up.
-        if self.common.too_wide() { f32::NEG_INFINITY } else { self.t_max }
+    fn bundle(&self) -> &Bundle {
+        &self.common.bundle
     }
-}
 
-impl<S: Simd> Together<'_, S> {
     #[inline(never)]
-    fn visit(&mut self, simd: S, number: u32) {
+    fn leaf(&mut self, simd: S, number: u32, rays: u32) {
         simd.vectorize(
             #[inline(always)]
             || {
                 let nearest = &mut self.nearest;
-                let mut shorter = false;
-                let leaf = &self.mesh.leaves[number as usize];
-                self.common.visit(simd, leaf, self.mesh.exact, |last, lane, eight, outcome| {
-                    let mut rays = outcome.maybe;
-                    while rays != 0 {
-                        let ray = rays.trailing_zeros() as usize & 7;
-                        rays &= rays - 1;
-                        let (through, depth) = (outcome.through >> ray & 1 == 1, outcome.depths.interval(ray));
-                        let nearest = &mut nearest[eight + ray];
-                        nearest.consider(simd, [number, lane], through, depth);
-                        if nearest.t_max < last[ray] {
-                            last[ray] = nearest.t_max;
-                            shorter = true;
-                        }
-                    }
-                    true
+                let leaf = &self.common.mesh.leaves[number as usize];
+                self.common.visit(simd, leaf, rays, |lane, ray, through, depth, last| {
+                    let nearest = &mut nearest[ray];
+                    nearest.consider(simd, [number, lane as u32], through, depth);
+                    if nearest.t_max < last { nearest.t_max } else { last }
                 });
-                if shorter {
-                    let latest = |n: &Nearest| n.t_max;
-                    self.t_max = self.nearest.iter().map(latest).fold(f32::NEG_INFINITY, f32::max);
-                }
             },
         );
     }
@@ -210,56 +171,42 @@ impl<S: Simd> Together<'_, S> {
 #[inline(always)]
 fn any_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mut [bool; RAYS]) -> bool {
     let Some(bundle) = Bundle::new(simd, mesh.frame(), rays) else { return false };
-    let mut walk = Until { mesh, rays, common: Common::new(simd, &bundle), hits };
-    *walk.hits = [false; RAYS];
-    bvh::any(simd, &mesh.tree, &bundle.lanes(simd), bundle.t_max, &mut walk);
-    !walk.common.too_wide() || !walk.hits.contains(&false)
+    *hits = [false; RAYS];
+    let sure = std::array::from_fn(|i| bundle.rays[i / 8].sure(i % 8));
+    let mut walk = Until { rays, sure, common: Common::new(simd, mesh, bundle), hits };
+    bvh::together(simd, &mesh.tree, &mut walk);
+    true
 }
 
 /// A bundle's walk until all rays are known to hit something.
-struct Until<'a, S: Simd> {
-    mesh: &'a Mesh,
+struct Until<'a> {
     rays: &'a [Stretch; RAYS],
-    common: Common<S>,
+    sure: [Sure; RAYS],
+    common: Common<'a>,
     hits: &'a mut [bool; RAYS],
 }
 
-impl<S: Simd> bvh::Any<S> for Until<'_, S> {
+impl<S: Simd> bvh::Together<S> for Until<'_> {
     #[inline(always)]
-    fn leaf(&mut self, simd: S, leaf: u32) -> bool {
-        self.visit(simd, leaf) || self.common.too_wide()
+    fn bundle(&self) -> &Bundle {
+        &self.common.bundle
     }
-}
 
-impl<S: Simd> Until<'_, S> {
-    /// Whether all rays are done.
     #[inline(never)]
-    fn visit(&mut self, simd: S, leaf: u32) -> bool {
+    fn leaf(&mut self, simd: S, leaf: u32, rays: u32) {
         simd.vectorize(
             #[inline(always)]
             || {
-                let (hits, given) = (&mut *self.hits, self.rays);
-                let (leaf, mesh) = (&self.mesh.leaves[leaf as usize], self.mesh);
-                self.common.visit(simd, leaf, mesh.exact, |last, lane, eight, outcome| {
-                    let mut rays = outcome.maybe;
-                    while rays != 0 {
-                        let ray = rays.trailing_zeros() as usize & 7;
-                        rays &= rays - 1;
-                        let (ref origin, within) = given[eight + ray];
-                        if hits[eight + ray] {
-                            continue;
-                        }
-                        let sure = Sure::new(Limits::PLAIN, within);
-                        let certain = outcome.through >> ray & 1 == 1 && sure.holds(outcome.depths.interval(ray));
-                        if certain || occluded(simd, mesh, origin, within, leaf, lane as usize) {
-                            hits[eight + ray] = true;
-                            last[ray] = f32::NEG_INFINITY;
-                        }
-                    }
-                    hits.contains(&false)
+                let (hits, given, sure, mesh) = (&mut *self.hits, self.rays, &self.sure, self.common.mesh);
+                let leaf = &mesh.leaves[leaf as usize];
+                self.common.visit(simd, leaf, rays, |lane, ray, through, depth, last| {
+                    let (ref origin, within) = given[ray];
+                    hits[ray] = hits[ray]
+                        || through && sure[ray].holds(depth)
+                        || occluded(simd, mesh, origin, within, leaf, lane);
+                    if hits[ray] { f32::NEG_INFINITY } else { last }
                 });
-                !hits.contains(&false)
             },
-        )
+        );
     }
 }

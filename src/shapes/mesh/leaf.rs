@@ -197,18 +197,9 @@ impl Leaf {
         let (e1, e2) = if exact { (minus(v1, v0), minus(v2, v0)) } else { (v1, v2) };
         Triangles { v0, e1, e2, size: self.size.simd_into(simd) }
     }
-
-    /// One triangle, in every lane.
-    #[inline(always)]
-    pub(super) fn triangle<S: Simd>(&self, simd: S, lane: usize, exact: bool) -> Triangles<S> {
-        let (v0, v1, v2) =
-            (everywhere(simd, &self.v0, lane), everywhere(simd, &self.v1, lane), everywhere(simd, &self.v2, lane));
-        let (e1, e2) = if exact { (minus(v1, v0), minus(v2, v0)) } else { (v1, v2) };
-        Triangles { v0, e1, e2, size: splat(simd, self.size[lane & 7]) }
-    }
 }
 
-/// Eight tests, of a ray and a triangle each, for t between `t_min` and `last`; `None` if all are certain misses.
+/// The tests of a ray with eight triangles, for t between `t_min` and `last`; `None` if all are certain misses.
 #[inline(always)]
 pub(super) fn filter<S: Simd>(
     simd: S,
@@ -258,6 +249,12 @@ pub(super) fn filter<S: Simd>(
 }
 
 impl Margins {
+    /// Of every ray of a bundle, and the t beyond which, either way, none has a hit.
+    pub(super) fn of_bundle(bundle: &Bundle) -> (Self, f32) {
+        let steps = steps(bundle.size, PLAIN_ERROR);
+        (Self::new(steps, bundle.lengths[1]), steps / bundle.lengths[0])
+    }
+
     /// For directions whose largest coordinate is at most `length`.
     #[inline(always)]
     fn new(steps: f32, length: f32) -> Self {
@@ -278,73 +275,6 @@ impl Margins {
         let of_c = taxicab(c).mul_add(splat(simd, 2.5 * E), splat(simd, 16.0 * E * self.place));
         let of_t = taxicab(n).mul_add(splat(simd, self.place), square.mul_add(of_c, splat(simd, UNDERFLOW)));
         (of_t, square * splat(simd, self.det))
-    }
-}
-
-/// All rays of a bundle at once, as a middle one and how far the others are from it.
-pub(super) struct Thick<S: Simd> {
-    origin: Vec8<S>,
-    direction: Vec8<S>,
-    /// Largest difference of a direction, and the part of (v₀ − o) × d's difference that no triangle has a say in.
-    turn: Vec8<S>,
-    shift: Vec8<S>,
-    pub(super) margins: Margins,
-    /// No hit has a t above this in absolute value.
-    pub(super) reach: f32,
-}
-
-impl<S: Simd> Thick<S> {
-    #[inline(always)]
-    pub(super) fn new(simd: S, bundle: &Bundle) -> Self {
-        let steps = steps(bundle.size, PLAIN_ERROR);
-        // Up by far more than the roundings of what is made of them.
-        let up = 1.0 + 1e-5;
-        let (mut turn, mut moved, mut most, mut shift) = ([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
-        for i in 0..3 {
-            (turn[i], moved[i]) = (bundle.direction_spread[i] * up, bundle.origin_spread[i] * up);
-            most[i] = bundle.direction[i].abs() + turn[i];
-        }
-        for (i, shift) in shift.iter_mut().enumerate() {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            *shift = (moved[j] * most[k] + moved[k] * most[j]) * up;
-        }
-        Self {
-            origin: three(simd, bundle.origin),
-            direction: three(simd, bundle.direction),
-            turn: three(simd, turn),
-            shift: three(simd, shift),
-            margins: Margins::new(steps, bundle.lengths[1]),
-            reach: steps / bundle.lengths[0],
-        }
-    }
-
-    /// The triangles that are not certain to be missed by all.
-    #[inline(always)]
-    pub(super) fn test(&self, simd: S, triangles: &Triangles<S>) -> u32 {
-        let &Triangles { v0, e1, e2, size } = triangles;
-        let c = minus(v0, self.origin);
-        let r = cross(c, self.direction);
-        let n = cross(e1, e2);
-        let det = dot(n, self.direction);
-        let u = dot(r, e2);
-        let v = -dot(r, e1);
-        let w = det - u - v;
-        // How much of r, and with it of u, v, det and w, the rays differ by.
-        let (c, turn, shift) = (absolute(c), self.turn, self.shift);
-        let r = [
-            c[1].mul_add(turn[2], c[2].mul_add(turn[1], shift[0])),
-            c[2].mul_add(turn[0], c[0].mul_add(turn[2], shift[1])),
-            c[0].mul_add(turn[1], c[1].mul_add(turn[0], shift[2])),
-        ];
-        let (of_u, of_v) = (dot(r, absolute(e2)), dot(r, absolute(e1)));
-        let of_w = dot(absolute(n), turn) + (of_u + of_v);
-        let margin = self.margins.edges(simd, size);
-        let up = splat(simd, 1.0 + 1e-5);
-        let (of_u, of_v, of_w) = (of_u.mul_add(up, margin), of_v.mul_add(up, margin), of_w.mul_add(up, margin));
-        let below = u.simd_lt(-of_u) | v.simd_lt(-of_v) | w.simd_lt(-of_w);
-        let above = u.simd_gt(of_u) | v.simd_gt(of_v) | w.simd_gt(of_w);
-        let empty = size.simd_lt(0.0);
-        !(((below & above) | empty).to_bitmask() as u32) & 0xff
     }
 }
 
@@ -370,7 +300,7 @@ impl Depths {
     }
 }
 
-pub(super) type Vec8<S> = [f32x8<S>; 3];
+type Vec8<S> = [f32x8<S>; 3];
 
 #[inline(always)]
 fn splat<S: Simd>(simd: S, x: f32) -> f32x8<S> {
@@ -383,24 +313,19 @@ fn spread<S: Simd>(simd: S, v: &[f32; 4]) -> Vec8<S> {
 }
 
 #[inline(always)]
-pub(super) fn load<S: Simd>(simd: S, rows: &[[f32; 8]; 3]) -> Vec8<S> {
+fn load<S: Simd>(simd: S, rows: &[[f32; 8]; 3]) -> Vec8<S> {
     [rows[0].simd_into(simd), rows[1].simd_into(simd), rows[2].simd_into(simd)]
 }
 
 /// One lane of each row, in every lane.
 #[inline(always)]
-fn everywhere<S: Simd>(simd: S, rows: &[[f32; 8]; 3], lane: usize) -> Vec8<S> {
+pub(super) fn everywhere<S: Simd>(simd: S, rows: &[[f32; 8]; 3], lane: usize) -> Vec8<S> {
     three(simd, [rows[0][lane & 7], rows[1][lane & 7], rows[2][lane & 7]])
 }
 
 #[inline(always)]
 fn three<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> Vec8<S> {
     [splat(simd, x), splat(simd, y), splat(simd, z)]
-}
-
-#[inline(always)]
-fn absolute<S: Simd>(a: Vec8<S>) -> Vec8<S> {
-    [a[0].abs(), a[1].abs(), a[2].abs()]
 }
 
 /// The sum of the components' sizes.
