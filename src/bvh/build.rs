@@ -138,7 +138,7 @@ impl Node {
 /// Half the surface of a box; infinite boxes have a large finite one, so that sums stay comparable.
 #[inline(always)]
 pub(super) fn half_area(min: &[f32; 3], max: &[f32; 3]) -> f32 {
-    let side = |i: usize| (max[i] - min[i]).min(1e9);
+    let side = |i: usize| if max[i] - min[i] < 1e9 { max[i] - min[i] } else { 1e9 };
     let (x, y, z) = (side(0), side(1), side(2));
     x * y + y * z + z * x
 }

@@ -97,7 +97,7 @@ fn split_in_bins<S: Simd, const BINS: usize>(simd: S, items: &mut [Item], depth:
     if items.len() % 2 == 1 {
         bins.put(&binning, &second[second.len() - 1]);
     }
-    let Bins { bounds, counts } = bins;
+    let Bins { bounds, counts } = &bins;
     let leaves = |count: u32| ((count + (1 << leaf) - 1) >> leaf) as f32;
     // The axes beside each other, so that none waits for its own areas.
     let mut costs = [[0.0f32; BINS]; 3];
