@@ -177,10 +177,9 @@ impl<S: Shape> Affine<S> {
         let n = shape.normal(ray, hit);
         let curvature = shape.curvature(ray, hit);
         let normal_error = shape.normal_error(ray, hit) + curvature * (hit.error * size + e_size + unknown);
-        let (slope, slope_low, slope_rounding) =
-            sum::<Split>(n.to_array(), ray.direction, 0.0, n.dot(image.direction_low));
-        let slope = slope + slope_low;
-        let slope_error = normal_error * size + 4.0 * U * slope.abs() + slope_rounding + image.direction_error;
+        let slope = n.dot(ray.direction) + n.dot(image.direction_low);
+        // Three products, three sums, and products that vanish.
+        let slope_error = (normal_error + 5.0 * U) * size + image.direction_error + f64::from_bits(8);
         let least_slope = slope.abs() - slope_error;
         let shift = -n.dot(e) / slope;
         let first = (unknown + (normal_error + 4.0 * U) * e_size + shift.abs() * slope_error) / least_slope;
