@@ -1,10 +1,10 @@
 //! Closest and any hit of a mesh.
 
 use super::Mesh;
-use super::leaf::{Leaf, Outcome, Probe};
+use super::leaf::{Leaf, Outcome, Probe, UNCERTIFIED};
 use crate::bvh::{self, Lanes, Limits, LocalRay, Sure};
 use crate::kernel::eft::{Fused, Split};
-use crate::kernel::{tally, triangle};
+use crate::kernel::{tally, textbook, triangle};
 use crate::{Hit, Interval, Ray};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::DVec3;
@@ -135,6 +135,9 @@ fn nearer(mesh: &Mesh, ray: &Ray, best: Option<Hit>, hit: Hit) -> Hit {
 /// The exact test with the products of the instruction level at hand.
 #[inline(always)]
 fn confirm<S: Simd>(simd: S, ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
+    if UNCERTIFIED {
+        return textbook::moller_trumbore::<f64>(ray, vertices, within);
+    }
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     let fused = matches!(simd.level(), Level::Avx2(_) | Level::Avx512(_));
     #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
