@@ -122,7 +122,14 @@ fn tile(mesh: &Mesh, random: &mut Rng) -> Vec<(Ray, Interval)> {
     let eye = mesh.bounds().center() + (0.2 + random.fraction()) * size * random.unit();
     let step = (target - eye).length() * 0.1f64.powi(1 + random.index(4) as i32);
     let (right, up) = (step * random.unit(), step * random.unit());
-    let spoiled = random.index(6);
+    let spoiled = random.index(8);
+    // Along an axis: components that are zero, and of either sign beside each other.
+    let axis = [DVec3::X, DVec3::Y, DVec3::Z][random.index(3)];
+    let (eye, right, up) = if spoiled >= 6 {
+        (target + size * axis, step * axis.any_orthogonal_vector(), step * axis.cross(axis.any_orthogonal_vector()))
+    } else {
+        (eye, right, up)
+    };
     let to_light = random.index(3) == 0;
     (0..48)
         .map(|i| {
@@ -136,6 +143,7 @@ fn tile(mesh: &Mesh, random: &mut Rng) -> Vec<(Ray, Interval)> {
                 (2, 22) => (ray, Interval::new(1.0, 1.0)),
                 (3, 23) => (Ray::new(1e9 * ray.origin, ray.direction), within),
                 (4, _) => (ray, Interval::new(0.0, 0.9 + 0.01 * f64::from(i))),
+                (7, _) => (Ray::new(at + size * axis, -axis), Interval::FORWARD),
                 _ => (ray, within),
             }
         })

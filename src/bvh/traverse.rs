@@ -45,6 +45,12 @@ impl<E: Copy + Default + Ord> Stack<E> {
         self.len += 1;
     }
 
+    /// The last entry.
+    #[inline(always)]
+    fn top(&mut self) -> &mut E {
+        &mut self.entries[(self.len - 1) & (ROOM - 1)]
+    }
+
     /// Pushes below all of the last `count` that are nearer.
     #[inline(always)]
     pub(super) fn insert(&mut self, entry: E, count: usize) {
@@ -65,6 +71,11 @@ impl<E: Copy + Default + Ord> Stack<E> {
         self.len -= 1;
         Some(self.entries[self.len & (ROOM - 1)])
     }
+}
+
+#[inline(always)]
+fn in_order(a: u64, b: u64) -> (u64, u64) {
+    if a < b { (a, b) } else { (b, a) }
 }
 
 /// A child, and the t where its box begins.
@@ -160,14 +171,27 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: 
             let second = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
             let (a, b) = (entry(child(first), enter[first]), entry(child(second), enter[second]));
-            let (nearer, farther) = if a < b { (a, b) } else { (b, a) };
+            let (nearer, farther) = in_order(a, b);
             stack.push(farther);
             if hits == 0 {
                 at = nearer as u32;
                 continue;
             }
+            // Three and four without branches on their order, which nothing foretells.
+            let third = hits.trailing_zeros() as usize & 7;
+            hits &= hits - 1;
+            let c = entry(child(third), enter[third]);
+            if hits == 0 {
+                let (c, farther) = in_order(c, farther);
+                let (nearer, c) = in_order(nearer, c);
+                *stack.top() = farther;
+                stack.push(c);
+                at = nearer as u32;
+                continue;
+            }
             stack.push(nearer);
-            let mut count = 2;
+            stack.insert(c, 2);
+            let mut count = 3;
             while hits != 0 {
                 let i = hits.trailing_zeros() as usize & 7;
                 hits &= hits - 1;
