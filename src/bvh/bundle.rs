@@ -6,7 +6,7 @@
 use super::frame::Frame;
 use super::slab::{LENGTHS, NEAR, PLAIN_ERROR, SLAB, STEEPEST, Sure, plain_ends};
 use super::traverse::Stack;
-use super::wide::{LEAF, Wide, WideNode};
+use super::wide::{LEAF, Wide, WideNode, near_rows};
 use crate::{Interval, Ray};
 use fearless_simd::{Simd, f32x8, f64x4, prelude::*};
 
@@ -101,7 +101,7 @@ impl Eight {
         (self.inv[axis].simd_into(simd), self.near_shift[axis].simd_into(simd), self.far_shift[axis].simd_into(simd))
     }
 
-    /// The rays that may meet the box of lane `lane`; `near` as in [`Lanes`].
+    /// The rays that may meet the box of lane `lane`; `near` as of [`near_rows`].
     #[inline(always)]
     fn meet<S: Simd>(&self, simd: S, node: &WideNode, lane: usize, near: &[u32; 3]) -> u32 {
         let (mut enter, mut exit): (f32x8<S>, f32x8<S>) = (self.t_min.simd_into(simd), self.t_max.simd_into(simd));
@@ -264,7 +264,7 @@ impl Bundle {
             far_origin: spread(simd, self.far_origin),
             inverse: [spread(simd, self.inverse[0]), spread(simd, self.inverse[1])],
             t_min: f32x8::splat(simd, self.t_min),
-            near: [self.away & 1, 2 + (self.away >> 1 & 1), 4 + (self.away >> 2 & 1)],
+            near: near_rows(self.away),
         }
     }
 }

@@ -4,7 +4,7 @@
 //! they say so.
 
 use super::slab::LocalRay;
-use super::wide::{CHILDREN, LEAF, NONE, Wide, WideNode};
+use super::wide::{CHILDREN, LEAF, NONE, Wide, WideNode, near_rows};
 use fearless_simd::{Simd, f32x8, prelude::*};
 
 /// What is left to visit, each with the t where its box begins in the highest bits. As integers they sort as t does, which is
@@ -95,7 +95,7 @@ pub(crate) struct Lanes<S: Simd> {
     near_shift: [f32x8<S>; 3],
     far_shift: [f32x8<S>; 3],
     t_min: f32x8<S>,
-    /// Which row of a node holds the plane met first, by axis; the other of the pair is met last.
+    /// See [`near_rows`].
     near: [u32; 3],
 }
 
@@ -107,7 +107,7 @@ impl<S: Simd> Lanes<S> {
             near_shift: spread(simd, &ray.near_shift),
             far_shift: spread(simd, &ray.far_shift),
             t_min: f32x8::splat(simd, ray.t_min),
-            near: [ray.away & 1, 2 + (ray.away >> 1 & 1), 4 + (ray.away >> 2 & 1)],
+            near: near_rows(ray.away),
         }
     }
 

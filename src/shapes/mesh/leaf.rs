@@ -138,7 +138,7 @@ pub(super) struct Margins {
 }
 
 /// The longest way to a triangle along one axis, from an origin with the largest coordinate `size`; its error as if it
-/// were part of that.
+/// were part of that; 10⁻⁵ covers the roundings here and of what is made of it.
 #[inline(always)]
 fn steps(size: f32, origin_error: f32) -> f32 {
     (1.0 + size) * (1.0 + 1e-5) + origin_error * (1.0 / E)
