@@ -313,7 +313,7 @@ pub(crate) trait Together<S: Simd> {
 pub(crate) fn together<S: Simd>(simd: S, tree: &Wide, walk: &mut impl Together<S>) {
     let nodes = &tree.nodes[..];
     let lanes = walk.bundle().lanes(simd);
-    let mut stack = Stack::<u128>::new();
+    let mut stack = Stack::<i128>::new();
     let (mut at, mut rays) = (0, (1 << RAYS) - 1);
     loop {
         if at & LEAF == 0 {
@@ -327,8 +327,9 @@ pub(crate) fn together<S: Simd>(simd: S, tree: &Wide, walk: &mut impl Together<S
                 hits &= hits - 1;
                 let met = bundle.meet(simd, node, lane, &lanes.near, rays);
                 if met != 0 {
-                    let entry = u128::from(enter[lane].to_bits()) << 64 | u128::from(met) << 32;
-                    stack.insert(entry | u128::from(node.child(lane)), count);
+                    // Signed, as a single ray's entries are.
+                    let t = i128::from(enter[lane].to_bits() as i32);
+                    stack.insert(t << 64 | i128::from(met) << 32 | i128::from(node.child(lane)), count);
                     count += 1;
                 }
             }

@@ -7,9 +7,9 @@ use super::slab::LocalRay;
 use super::wide::{CHILDREN, LEAF, NONE, Wide, WideNode, near_rows};
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-/// What is left to visit, each with the t where its box begins in the highest bits. As integers they sort as t does, which is
-/// ≥ 0 in all but odd intervals; there the order is worse and nothing else. Kept in a fixed array; what does not fit, which
-/// no sensible tree needs, goes to the heap.
+/// What is left to visit, each with the t where its box begins in the highest bits. As signed integers they sort as t does, but for
+/// negative ones among themselves: boxes that the ray starts in come first. Kept in a fixed array; what does not fit,
+/// which no sensible tree needs, goes to the heap.
 pub(super) struct Stack<E> {
     entries: [E; ROOM],
     len: usize,
@@ -74,14 +74,14 @@ impl<E: Copy + Default + Ord> Stack<E> {
 }
 
 #[inline(always)]
-fn in_order(a: u64, b: u64) -> (u64, u64) {
+fn in_order(a: i64, b: i64) -> (i64, i64) {
     if a < b { (a, b) } else { (b, a) }
 }
 
 /// A child, and the t where its box begins.
 #[inline(always)]
-fn entry(child: u32, t: f32) -> u64 {
-    u64::from(t.to_bits()) << 32 | u64::from(child)
+fn entry(child: u32, t: f32) -> i64 {
+    (u64::from(t.to_bits()) << 32 | u64::from(child)) as i64
 }
 
 #[inline(always)]
@@ -148,7 +148,7 @@ pub(crate) trait Any<S: Simd> {
 #[inline(always)]
 pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: f32, leaves: &mut impl Closest<S>) {
     let nodes = &tree.nodes[..];
-    let mut stack = Stack::<u64>::new();
+    let mut stack = Stack::<i64>::new();
     let mut at = 0u32;
     loop {
         // Down to a leaf, or to nothing.
@@ -218,7 +218,7 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: 
 #[inline(always)]
 pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, t_max: f32, leaves: &mut impl Any<S>) -> bool {
     let nodes = &tree.nodes[..];
-    let mut stack = Stack::<u64>::new();
+    let mut stack = Stack::<i64>::new();
     let mut at = 0u32;
     loop {
         while at & LEAF == 0 {
@@ -238,7 +238,7 @@ pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, t_max: f32, lea
             while hits != 0 {
                 let i = hits.ilog2();
                 hits &= !(1 << i);
-                stack.push(u64::from(child(i as usize)));
+                stack.push(i64::from(child(i as usize)));
             }
         }
         if at != NONE && leaves.leaf(simd, at & !LEAF) {

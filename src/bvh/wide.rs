@@ -71,7 +71,7 @@ pub(super) fn near_rows(away: u32) -> [u32; 3] {
 #[derive(Clone, Debug)]
 pub(crate) struct Wide {
     pub(crate) frame: Frame,
-    /// Leaves are numbered from zero in depth-first order.
+    /// Leaves are numbered from zero.
     pub(crate) nodes: Vec<WideNode>,
 }
 

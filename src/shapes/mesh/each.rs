@@ -104,6 +104,10 @@ impl<'a> Common<'a> {
             let ray = rays.trailing_zeros() as usize & 15;
             rays &= rays - 1;
             let (eight, at) = (&mut self.bundle.rays[ray / 8], ray % 8);
+            // It got its answer after it was noted for this leaf.
+            if eight.t_max[at] == f32::NEG_INFINITY {
+                continue;
+            }
             let [o, d] = [everywhere(simd, &eight.origin, at), everywhere(simd, &eight.direction, at)];
             let stretch = [f32x8::splat(simd, eight.t_min[at]), f32x8::splat(simd, eight.t_max[at])];
             let Some(outcome) = filter(simd, &triangles, [o, d], &self.margins, stretch) else { continue };

@@ -150,8 +150,11 @@ const E: f32 = f32::EPSILON / 2.0;
 /// Whether leaves are tested as others test them, to find out what certainty costs: CONTRIBUTING.md. The answers are wrong then.
 pub(super) const UNCERTIFIED: bool = cfg!(truehit_uncertified);
 
-/// What underflow may add to any of the filter's sums.
+/// What underflow may add to an edge function.
 const UNDERFLOW: f32 = 1e-36;
+
+/// And to t's numerator, against its denominator times a limit of t: that is up to 5·2⁴⁰, and multiplies what the denominator lost.
+const DEPTH_UNDERFLOW: f32 = 1e-31;
 
 impl Probe {
     #[inline(always)]
@@ -282,7 +285,7 @@ impl Margins {
         }
         let square = size * size;
         let of_c = taxicab(c).mul_add(splat(simd, 2.5 * E), splat(simd, 16.0 * E * self.place));
-        let of_t = taxicab(n).mul_add(splat(simd, self.place), square.mul_add(of_c, splat(simd, UNDERFLOW)));
+        let of_t = taxicab(n).mul_add(splat(simd, self.place), square.mul_add(of_c, splat(simd, DEPTH_UNDERFLOW)));
         (of_t, square * splat(simd, self.det))
     }
 }
@@ -296,7 +299,7 @@ pub(super) struct Outcome {
     pub(super) depths: Depths,
 }
 
-/// t of a leaf's triangles, by lane: the exact t is between these. NaN if nothing is known.
+/// t of a leaf's triangles, by lane: between these where the line certainly passes through, and nothing where it may not.
 pub(super) struct Depths {
     low: [f32; 8],
     high: [f32; 8],
