@@ -4,7 +4,7 @@
 //! left with each ray, eight a vector: docs/numerics.md §10.
 
 use super::frame::Frame;
-use super::slab::{LENGTHS, NEAR, PLAIN_ERROR, SLAB, STEEPEST, Sure, plain_ends};
+use super::slab::{E, LENGTHS, NEAR, PLAIN_ERROR, SLAB, STEEPEST, Sure, plain_ends};
 use super::traverse::Stack;
 use super::wide::{LEAF, Wide, WideNode, near_rows};
 use crate::{Interval, Ray};
@@ -20,9 +20,6 @@ const WIDEST: f32 = 1.0 / 8.0;
 /// Slopes steeper than this, against the direction's longest coordinate, have inverses that bound nothing: such an axis is left
 /// out of the bounds, as is one on which the rays go either way.
 const FLATTEST: f32 = 1.0 / 1_048_576.0; // 2⁻²⁰
-
-/// The unit roundoff of f32, 2⁻²⁴.
-const E: f32 = f32::EPSILON / 2.0;
 
 /// What underflow may take from a product of a distance and an inverse, and far below any t that matters.
 const UNDERFLOW: f32 = 1e-30;
@@ -258,8 +255,8 @@ impl Bundle {
 
     /// The bounds in every lane.
     #[inline(always)]
-    fn lanes<S: Simd>(&self, simd: S) -> Lanes<S> {
-        Lanes {
+    fn bounds<S: Simd>(&self, simd: S) -> Bounds<S> {
+        Bounds {
             near_origin: spread(simd, self.near_origin),
             far_origin: spread(simd, self.far_origin),
             inverse: [spread(simd, self.inverse[0]), spread(simd, self.inverse[1])],
@@ -275,7 +272,7 @@ fn spread<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
 }
 
 /// [`Bundle`]'s bounds in every lane.
-struct Lanes<S: Simd> {
+struct Bounds<S: Simd> {
     near_origin: [f32x8<S>; 3],
     far_origin: [f32x8<S>; 3],
     inverse: [[f32x8<S>; 3]; 2],
@@ -283,7 +280,7 @@ struct Lanes<S: Simd> {
     near: [u32; 3],
 }
 
-impl<S: Simd> Lanes<S> {
+impl<S: Simd> Bounds<S> {
     /// Which of the node's boxes a ray may meet before `t_max`, and from which t on.
     #[inline(always)]
     fn test(&self, simd: S, node: &WideNode, t_max: f32) -> (u32, f32x8<S>) {
@@ -312,20 +309,20 @@ pub(crate) trait Together<S: Simd> {
 #[inline(always)]
 pub(crate) fn together<S: Simd>(simd: S, tree: &Wide, walk: &mut impl Together<S>) {
     let nodes = &tree.nodes[..];
-    let lanes = walk.bundle().lanes(simd);
+    let bounds = walk.bundle().bounds(simd);
     let mut stack = Stack::<i128>::new();
     let (mut at, mut rays) = (0, (1 << RAYS) - 1);
     loop {
         if at & LEAF == 0 {
             let (node, bundle) = (&nodes[at as usize], walk.bundle());
-            let (mut hits, enter) = lanes.test(simd, node, bundle.t_max);
+            let (mut hits, enter) = bounds.test(simd, node, bundle.t_max);
             let enter: [f32; 8] = enter.into();
             stack.reserve();
             let mut count = 0;
             while hits != 0 {
                 let lane = hits.trailing_zeros() as usize & 7;
                 hits &= hits - 1;
-                let met = bundle.meet(simd, node, lane, &lanes.near, rays);
+                let met = bundle.meet(simd, node, lane, &bounds.near, rays);
                 if met != 0 {
                     // Signed, as a single ray's entries are.
                     let t = i128::from(enter[lane].to_bits() as i32);

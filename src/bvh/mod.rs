@@ -26,7 +26,7 @@ pub use level::Level;
 pub(crate) use bundle::{Bundle, RAYS, Together, together};
 pub(crate) use collapse::build;
 pub(crate) use frame::Frame;
-pub(crate) use slab::{Limits, LocalRay, PLAIN_ERROR, Sure};
+pub(crate) use slab::{E, Limits, LocalRay, PLAIN_ERROR, Sure};
 pub(crate) use tasks::map;
 pub(crate) use traverse::{Any, Closest, Lanes, any, closest};
 pub(crate) use watch::Watch;

@@ -44,8 +44,11 @@ pub(crate) struct Limits {
     advance: f64,
 }
 
+/// The unit roundoff of f32, 2⁻²⁴.
+pub(crate) const E: f32 = f32::EPSILON / 2.0;
+
 /// Margin of a box test, relative to 1 + |origin|: eight roundings of f32 (six are needed: §10).
-pub(super) const SLAB: f32 = 8.0 / 16_777_216.0;
+pub(super) const SLAB: f32 = 8.0 * E;
 
 /// Slack of a limit at or near zero. Nothing in a tree of width 1 is that small, and products with it stay clear of the
 /// subnormals, whose arithmetic costs a hundred times as much.

@@ -6,7 +6,7 @@
 
 use super::Mesh;
 use crate::Aabb;
-use crate::bvh::{self, Bundle, Frame, LocalRay, PLAIN_ERROR, Wide};
+use crate::bvh::{self, Bundle, E, Frame, LocalRay, PLAIN_ERROR, Wide};
 use fearless_simd::{Simd, f32x8, prelude::*};
 use glam::DVec3;
 
@@ -143,9 +143,6 @@ pub(super) struct Margins {
 fn steps(size: f32, origin_error: f32) -> f32 {
     (1.0 + size) * (1.0 + 1e-5) + origin_error * (1.0 / E)
 }
-
-/// The unit roundoff of f32, 2⁻²⁴.
-const E: f32 = f32::EPSILON / 2.0;
 
 /// Whether leaves are tested as others test them, to find out what certainty costs: CONTRIBUTING.md. The answers are wrong then.
 pub(super) const UNCERTIFIED: bool = cfg!(truehit_uncertified);
