@@ -1,6 +1,10 @@
 //! What the slides teach, and where they are wrong: each erratum by its counter-example, so that the slide's formula
 //! fails the test. The numbers are those of docs/numerics.md §13.
 
+#[path = "support/rng.rs"]
+mod rng;
+
+use rng::Rng;
 use truehit::glam::{DAffine3, DMat3, DVec2, DVec3};
 use truehit::kernel::textbook;
 use truehit::shading::{Checker, Light, Material, RayCount, Rgb, Whitted, phong};
@@ -24,24 +28,10 @@ fn normal(shape: &dyn Shape, origin: [f64; 3], direction: [f64; 3]) -> DVec3 {
     shape.normal(&ray, &shape.intersect(&ray, Interval::FORWARD).expect("a hit"))
 }
 
-/// Numbers in [−1, 1) without a pattern: the same each time.
-struct Random(u64);
-
-impl Random {
-    fn number(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-    fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.number(), self.number(), self.number())
-    }
-    fn map(&mut self) -> DAffine3 {
-        // Far from singular.
-        DAffine3::from_mat3_translation(
-            DMat3::from_cols(self.vector(), self.vector(), self.vector()) * 0.3 + DMat3::IDENTITY,
-            3.0 * self.vector(),
-        )
-    }
+/// Far from singular.
+fn some_map(random: &mut Rng) -> DAffine3 {
+    let matrix = DMat3::from_cols(random.in_cube(1.0), random.in_cube(1.0), random.in_cube(1.0));
+    DAffine3::from_mat3_translation(matrix * 0.3 + DMat3::IDENTITY, 3.0 * random.in_cube(1.0))
 }
 
 #[test]
@@ -58,12 +48,12 @@ fn line_1_the_closest_hit_of_all_objects() -> Tested {
 
 #[test]
 fn lines_2_and_3_both_algorithms_agree_with_the_shipped_triangle() -> Tested {
-    let mut random = Random(1);
+    let mut random = Rng::new(1);
     let (mut hits, mut misses) = (0, 0);
     for _ in 0..2000 {
-        let vertices = [random.vector(), random.vector(), random.vector()];
+        let vertices = [random.in_cube(1.0), random.in_cube(1.0), random.in_cube(1.0)];
         // Aimed near the triangle.
-        let (origin, target) = (4.0 * random.vector(), 0.5 * random.vector());
+        let (origin, target) = (4.0 * random.in_cube(1.0), 0.5 * random.in_cube(1.0));
         let ray = Ray::new(origin, target - origin);
         let shipped = Triangle::new(vertices[0], vertices[1], vertices[2])?.intersect(&ray, Interval::LINE);
         for textbook in [
@@ -122,13 +112,13 @@ fn erratum_2_a_cone_is_not_half_an_ellipsoid() -> Tested {
 
 #[test]
 fn errata_3_and_4_the_deformed_surface_and_its_tangent_plane() -> Tested {
-    let mut random = Random(3);
+    let mut random = Rng::new(3);
     let mut hits = 0;
     for _ in 0..300 {
-        let map = random.map();
+        let map = some_map(&mut random);
         let deformed = Affine::new(Sphere::UNIT, map)?;
-        let origin = 8.0 * random.vector();
-        let ray = Ray::new(origin, map.translation + random.vector() - origin);
+        let origin = 8.0 * random.in_cube(1.0);
+        let ray = Ray::new(origin, map.translation + random.in_cube(1.0) - origin);
         let Some(hit) = deformed.intersect(&ray, Interval::LINE) else { continue };
         hits += 1;
         // F(q) = f(A⁻¹(q − t)) at the hit point q: q, not the p that q is the image of.
@@ -154,10 +144,10 @@ fn errata_3_and_4_the_deformed_surface_and_its_tangent_plane() -> Tested {
 
 #[test]
 fn erratum_5_the_unit_sphere_has_radius_one_around_the_origin() {
-    let mut random = Random(5);
+    let mut random = Rng::new(5);
     for _ in 0..100 {
         // From the centre every ray meets it at distance one; "at a point p, ‖p‖ = 1" would be another sphere.
-        let direction = random.vector().normalize();
+        let direction = random.in_cube(1.0).normalize();
         let ray = Ray::new([0.0; 3], direction);
         let hit = Sphere::UNIT.intersect(&ray, Interval::FORWARD).unwrap();
         assert!((Sphere::UNIT.point(&ray, &hit).position.length() - 1.0).abs() < 1e-15);
@@ -284,9 +274,9 @@ fn erratum_12_clip_before_comparing() -> Tested {
 fn erratum_13_mirrored_maps_keep_normals_outward() -> Tested {
     let mirrored = Affine::new(Sphere::UNIT, DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)))?;
     // cross(Su, Sv) = det(S)·S⁻ᵀ(u×v) points inward.
-    let mut random = Random(13);
+    let mut random = Rng::new(13);
     for _ in 0..50 {
-        let outside = 3.0 * random.vector().normalize();
+        let outside = 3.0 * random.in_cube(1.0).normalize();
         let n = normal(&mirrored, outside.to_array(), (-outside).to_array());
         assert!((n - outside.normalize()).length() < 1e-12, "{n}");
     }
@@ -339,9 +329,9 @@ fn erratum_15_the_eye_may_be_inside_the_box() -> Tested {
     let corners = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
     let faces = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
     let octahedron = Mesh::new(corners.to_vec(), faces.to_vec())?;
-    let mut random = Random(15);
+    let mut random = Rng::new(15);
     for _ in 0..100 {
-        let ray = Ray::new(0.2 * random.vector(), random.vector());
+        let ray = Ray::new(0.2 * random.in_cube(1.0), random.in_cube(1.0));
         assert!(octahedron.intersect(&ray, Interval::FORWARD).is_some(), "{ray:?}");
     }
     Ok(())
@@ -366,18 +356,18 @@ fn erratum_16_no_highlight_from_behind() -> Tested {
 
 #[test]
 fn line_12_textures_by_surface_parameters_of_every_shape() -> Tested {
-    let mut random = Random(12);
+    let mut random = Rng::new(12);
     let shapes: [&dyn Shape; 5] = [
         &Sphere::UNIT,
         &Cylinder::new([0.0, 0.0, -1.0], [0.0, 0.0, 1.0], 0.5)?,
         &Cone::new([0.0, 0.0, -1.0], [0.0, 0.0, 1.0], 0.7)?,
         &Triangle::new([-1.0, -1.0, 0.0], [1.0, -1.0, 0.1], [0.0, 1.0, 0.2])?,
-        &Affine::new(Sphere::UNIT, random.map())?,
+        &Affine::new(Sphere::UNIT, some_map(&mut random))?,
     ];
     for shape in shapes {
         let (mut hits, mut low, mut high) = (0, DVec2::INFINITY, DVec2::NEG_INFINITY);
         for _ in 0..2000 {
-            let (origin, target) = (6.0 * random.vector(), shape.bounds().center() + random.vector());
+            let (origin, target) = (6.0 * random.in_cube(1.0), shape.bounds().center() + random.in_cube(1.0));
             let ray = Ray::new(origin, target - origin);
             let Some(hit) = shape.intersect(&ray, Interval::FORWARD) else { continue };
             let uv = shape.texture_coordinates(&ray, &hit);

@@ -66,7 +66,7 @@ impl<E: Copy + Default + Ord> Stack<E> {
     #[inline(always)]
     pub(super) fn pop(&mut self) -> Option<E> {
         if self.len == 0 {
-            return if self.spilled.is_empty() { None } else { self.spilled.pop() };
+            return self.spilled.pop();
         }
         self.len -= 1;
         Some(self.entries[self.len & (ROOM - 1)])
@@ -177,7 +177,7 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: 
                 at = nearer as u32;
                 continue;
             }
-            // Three and four without branches on their order, which nothing foretells.
+            // Three without branches on their order, which nothing foretells.
             let third = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
             let c = entry(child(third), enter[third]);

@@ -47,8 +47,8 @@ impl Leaf {
             self.v1[i][lane] = v1[i] as f32;
             self.v2[i][lane] = v2[i] as f32;
         }
-        // Two square roots and a sum in f64, then up: 2⁻²⁰ is far more than they lose.
-        self.size[lane] = ((e1.length() + e2.length()) * (1.0 + 1e-6)) as f32;
+        // Two square roots and a sum in f64, and one rounding to f32.
+        self.size[lane] = ((e1.length() + e2.length()) * (1.0 + 2.0 * f64::from(E))) as f32;
         self.id[lane] = number | (rotation as u32) << ROTATION;
     }
 
@@ -138,10 +138,10 @@ pub(super) struct Margins {
 }
 
 /// The longest way to a triangle along one axis, from an origin with the largest coordinate `size`; its error as if it
-/// were part of that; 10⁻⁵ covers the roundings here and of what is made of it.
+/// were part of that; 128 roundings cover those here and of what is made of it.
 #[inline(always)]
 fn steps(size: f32, origin_error: f32) -> f32 {
-    (1.0 + size) * (1.0 + 1e-5) + origin_error * (1.0 / E)
+    (1.0 + size) * (1.0 + 128.0 * E) + origin_error * (1.0 / E)
 }
 
 /// Whether leaves are tested as others test them, to find out what certainty costs: CONTRIBUTING.md. The answers are wrong then.
@@ -150,7 +150,8 @@ pub(super) const UNCERTIFIED: bool = cfg!(truehit_uncertified);
 /// What underflow may add to an edge function.
 const UNDERFLOW: f32 = 1e-36;
 
-/// And to t's numerator, against its denominator times a limit of t: that is up to 5·2⁴⁰, and multiplies what the denominator lost.
+/// And to t's numerator, against its denominator times a limit of t: that is up to 5·2⁴⁰, and multiplies what the
+/// denominator lost.
 const DEPTH_UNDERFLOW: f32 = 1e-31;
 
 impl Probe {
