@@ -1,7 +1,7 @@
 //! Which instructions this CPU has, asked once; code is compiled for each and chosen at run time.
 
 use super::lanes::Lanes;
-use fearless_simd::Level;
+use fearless_simd::{Level, Simd};
 
 /// Runs `fused` compiled for a CPU with fused multiply-add if this one has it, else `portable`.
 ///
@@ -12,7 +12,6 @@ use fearless_simd::Level;
 pub fn dispatch<R>(fused: impl FnOnce() -> R, portable: impl FnOnce() -> R) -> R {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     {
-        use fearless_simd::Simd;
         match Level::new().as_avx2() {
             Some(avx2) => avx2.vectorize(fused),
             None => portable(),
@@ -35,7 +34,6 @@ pub fn dispatch<R>(fused: impl FnOnce() -> R, portable: impl FnOnce() -> R) -> R
 pub fn dispatch_lanes<R>(fused: impl FnOnce(<FusedLanes as Lanes>::Cpu) -> R, portable: impl FnOnce() -> R) -> R {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     {
-        use fearless_simd::Simd;
         match Level::new().as_avx2() {
             Some(avx2) => avx2.vectorize(
                 #[inline(always)]
@@ -53,6 +51,18 @@ pub fn dispatch_lanes<R>(fused: impl FnOnce(<FusedLanes as Lanes>::Cpu) -> R, po
     {
         let _ = fused;
         portable()
+    }
+}
+
+/// Whether code compiled for the instructions of `simd` has fused multiply-add, known when it is compiled.
+#[inline(always)]
+pub fn has_fused<S: Simd>(simd: S) -> bool {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    return matches!(simd.level(), Level::Avx2(_) | Level::Avx512(_));
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    {
+        let _ = simd;
+        cfg!(target_arch = "aarch64")
     }
 }
 

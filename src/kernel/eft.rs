@@ -5,6 +5,7 @@
 
 use super::cpu::{FusedLanes, fused_lanes};
 use super::lanes::{Lanes, Plain};
+use fearless_simd::{Simd, f64x4};
 use glam::DVec3;
 use std::fmt::Debug;
 use std::ops::{Add, Sub};
@@ -48,6 +49,10 @@ pub trait Product: Copy + Debug {
     fn two_product(a: f64, b: f64) -> (f64, f64);
     /// n − q·d, rounded once, for a quotient q so near n/d that n − fl(q·d) is exact.
     fn remainder(n: f64, q: f64, d: f64) -> f64;
+    /// [`Product::two_product`] in each lane.
+    fn two_products<S: Simd>(a: f64x4<S>, b: f64x4<S>) -> (f64x4<S>, f64x4<S>);
+    /// [`Product::remainder`] in each lane.
+    fn remainders<S: Simd>(n: f64x4<S>, q: f64x4<S>, d: f64x4<S>) -> f64x4<S>;
     /// What [`Lanes`] need to know of the CPU: it is asked whether it has the instructions.
     fn cpu() -> <Self::Lanes as Lanes>::Cpu;
 }
@@ -79,6 +84,17 @@ impl Product for Fused {
     fn remainder(n: f64, q: f64, d: f64) -> f64 {
         f64::mul_add(-q, d, n)
     }
+
+    #[inline(always)]
+    fn two_products<S: Simd>(a: f64x4<S>, b: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+        let p = a * b;
+        (p, a.simd.mul_sub_precise_f64x4(a, b, p))
+    }
+
+    #[inline(always)]
+    fn remainders<S: Simd>(n: f64x4<S>, q: f64x4<S>, d: f64x4<S>) -> f64x4<S> {
+        n.simd.mul_add_precise_f64x4(-q, d, n)
+    }
 }
 
 impl Product for Split {
@@ -100,13 +116,36 @@ impl Product for Split {
         let (t, t_lo) = Self::two_product(q, d);
         (n - t) - t_lo
     }
+
+    #[inline(always)]
+    fn two_products<S: Simd>(a: f64x4<S>, b: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+        let p = a * b;
+        let ((a_hi, a_lo), (b_hi, b_lo)) = (splits(a), splits(b));
+        (p, ((a_hi * b_hi - p) + a_hi * b_lo + a_lo * b_hi) + a_lo * b_lo)
+    }
+
+    #[inline(always)]
+    fn remainders<S: Simd>(n: f64x4<S>, q: f64x4<S>, d: f64x4<S>) -> f64x4<S> {
+        let (t, t_lo) = Self::two_products(q, d);
+        (n - t) - t_lo
+    }
 }
+
+/// 2²⁷ + 1
+const VELTKAMP: f64 = 134_217_729.0;
 
 /// a = hi + lo, each of at most 26 bits.
 #[inline(always)]
 fn split(a: f64) -> (f64, f64) {
-    const FACTOR: f64 = 134_217_729.0; // 2²⁷ + 1
-    let c = FACTOR * a;
+    let c = VELTKAMP * a;
+    let hi = c - (c - a);
+    (hi, a - hi)
+}
+
+/// [`split`] in each lane.
+#[inline(always)]
+fn splits<S: Simd>(a: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+    let c = a * a.simd.splat_f64x4(VELTKAMP);
     let hi = c - (c - a);
     (hi, a - hi)
 }

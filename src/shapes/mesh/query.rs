@@ -4,7 +4,7 @@ use super::Mesh;
 use super::leaf::{Leaf, Outcome, Probe, UNCERTIFIED};
 use crate::bvh::{self, Lanes, Limits, LocalRay, Sure};
 use crate::kernel::eft::{Fused, Split};
-use crate::kernel::{tally, textbook, triangle};
+use crate::kernel::{cpu, tally, textbook, triangle};
 use crate::{Hit, Interval, Ray};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::DVec3;
@@ -138,11 +138,7 @@ fn confirm<S: Simd>(simd: S, ray: &Ray, vertices: &[DVec3; 3], within: Interval)
     if UNCERTIFIED {
         return textbook::moller_trumbore::<f64>(ray, vertices, within);
     }
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    let fused = matches!(simd.level(), Level::Avx2(_) | Level::Avx512(_));
-    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-    let fused = cfg!(target_arch = "aarch64");
-    if fused {
+    if cpu::has_fused(simd) {
         triangle::intersect_with::<Fused>(ray, vertices, within)
     } else {
         triangle::intersect_with::<Split>(ray, vertices, within)

@@ -4,20 +4,22 @@
 //! one filter; λ is the plane's quotient with a normal in double-double, its bound proved beforehand. Where the filter is
 //! silent the signs are found in double-double, in integers or by [`Dyadic`]s. docs/numerics.md §4.
 
-use super::bound::{TRIANGLE_CLOSE, TRIANGLE_CONDITION, TRIANGLE_LAMBDA, TRIANGLE_SIDES, U, UNDERFLOW};
-use super::bounded::Bounded;
-use super::cpu;
-use super::dyadic::Dyadic;
-use super::eft::{Fused, Product, Split, two_diff, two_sum};
-use super::fixed;
-use super::float::power;
-use super::lanes::{Double, Lanes, Two};
-use super::number::{self, Number, cross, difference, dot, vector};
-use super::ratio::{self, Ratio};
-use super::tally;
+use crate::kernel::bound::{TRIANGLE_CLOSE, TRIANGLE_CONDITION, TRIANGLE_LAMBDA, TRIANGLE_SIDES, U, UNDERFLOW};
+use crate::kernel::bounded::Bounded;
+use crate::kernel::cpu;
+use crate::kernel::dyadic::Dyadic;
+use crate::kernel::eft::{Fused, Product, Split, two_diff, two_sum};
+use crate::kernel::fixed;
+use crate::kernel::float::power;
+use crate::kernel::lanes::{Double, Lanes, Two};
+use crate::kernel::number::{self, Number, cross, difference, dot, vector};
+use crate::kernel::ratio::{self, Ratio};
+use crate::kernel::tally;
 use crate::{Hit, Interval, Ray};
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
+
+pub mod four;
 
 /// Where `ray` meets the closed triangle of the three `vertices`, if λ lies inside `within`.
 ///
@@ -444,13 +446,13 @@ pub fn side(vertices: &[DVec3; 3], point: DVec3) -> Ordering {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lanes::Plain;
-    use super::super::search::{Rational, climb, cross3, dot3, each, exact, minus};
-    use super::super::tally::Tally;
     use super::*;
+    use crate::kernel::lanes::Plain;
+    use crate::kernel::search::{Rational, climb, cross3, dot3, each, exact, minus};
+    use crate::kernel::tally::Tally;
 
     /// From near and far, thin and plump, steep and grazing: vertices, and a ray at a point of their plane.
-    fn setting(x: &[f64]) -> (Ray, [DVec3; 3]) {
+    pub(super) fn setting(x: &[f64]) -> (Ray, [DVec3; 3]) {
         let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
         let (a, e1) = (v(0), v(3));
         let e2 = e1 * x[17] + v(6) * x[15].powi(7);
@@ -461,7 +463,7 @@ mod tests {
         (Ray { origin: target - direction * 2f64.powf(12.0 * x[13]), direction }, [a, a + e1, a + e2])
     }
 
-    const DIMENSION: usize = 20;
+    pub(super) const DIMENSION: usize = 20;
 
     /// D, s(c,a), s(a,b), s(b,c) and n·s, exactly.
     fn exact_products(ray: &Ray, &[a, b, c]: &[DVec3; 3]) -> [Rational; 5] {
