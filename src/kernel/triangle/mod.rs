@@ -68,11 +68,13 @@ fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3;
     }
     let bound = TRIANGLE_SIDES * size + VANISHED;
     let (sv, sw) = (-minus_sv, (det - su) + minus_sv);
+    // Turned to the ray: a branch on the orientation would be foretold by nothing.
     let (least, most) = extremes(su, sv, sw);
+    let (least, most) = if det < 0.0 { (-most, -least) } else { (least, most) };
     if (least < -bound) & (most > bound) {
         return None;
     }
-    if !((least > bound) | (most < -bound)) {
+    if !(least > bound) {
         return closely(ray, vertices, within);
     }
 

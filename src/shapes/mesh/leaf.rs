@@ -19,10 +19,8 @@ const ROTATION: u32 = 29;
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(super) struct Leaf {
-    v0: [[f32; 8]; 3],
-    /// v₁ and v₂ where they are the mesh's own, exactly; else e₁ = v₁ − v₀ and e₂ = v₂ − v₀, which lose less.
-    v1: [[f32; 8]; 3],
-    v2: [[f32; 8]; 3],
+    /// v₀, v₁ and v₂ where they are the mesh's own, exactly; else v₀, e₁ = v₁ − v₀ and e₂ = v₂ − v₀, which lose less.
+    vertices: [[[f32; 8]; 3]; 3],
     /// Not below |e₁| + |e₂|; −1 in a lane that holds no triangle.
     size: [f32; 8],
     /// The triangle's number, and by how many places its vertices are rotated.
@@ -30,7 +28,7 @@ pub(super) struct Leaf {
 }
 
 impl Leaf {
-    const EMPTY: Self = Self { v0: [[0.0; 8]; 3], v1: [[0.0; 8]; 3], v2: [[0.0; 8]; 3], size: [-1.0; 8], id: [0; 8] };
+    const EMPTY: Self = Self { vertices: [[[0.0; 8]; 3]; 3], size: [-1.0; 8], id: [0; 8] };
 
     /// Puts triangle `number` into a lane.
     fn set(&mut self, lane: usize, frame: &Frame, exact: bool, vertices: &[DVec3; 3], number: u32) {
@@ -43,9 +41,9 @@ impl Leaf {
         let (v0, e1, e2) = (frame.local(a), frame.local_difference(b, a), frame.local_difference(c, a));
         let (v1, v2) = if exact { (frame.local(b), frame.local(c)) } else { (e1, e2) };
         for i in 0..3 {
-            self.v0[i][lane] = v0[i] as f32;
-            self.v1[i][lane] = v1[i] as f32;
-            self.v2[i][lane] = v2[i] as f32;
+            for (rows, v) in self.vertices.iter_mut().zip([v0, v1, v2]) {
+                rows[i][lane] = v[i] as f32;
+            }
         }
         // Two square roots and a sum in f64, and one rounding to f32.
         self.size[lane] = ((e1.length() + e2.length()) * (1.0 + 2.0 * f64::from(E))) as f32;
@@ -63,12 +61,9 @@ impl Leaf {
         if !mesh.exact {
             return mesh.vertices(self.number(lane));
         }
-        let [a, b, c] = [&self.v0, &self.v1, &self.v2].map(|rows| mesh.frame().world(column(rows, lane)));
-        match self.id[lane] >> ROTATION {
-            0 => [a, b, c],
-            1 => [c, a, b],
-            _ => [b, c, a],
-        }
+        // Without a branch on the rotation, which nothing foretells.
+        let first = 3 - (self.id[lane] >> ROTATION) as usize;
+        [first, first + 1, first + 2].map(|i| mesh.frame().world(column(&self.vertices[i % 3], lane)))
     }
 }
 
@@ -197,7 +192,8 @@ impl Leaf {
     /// The leaf's triangles.
     #[inline(always)]
     pub(super) fn triangles<S: Simd>(&self, simd: S, exact: bool) -> Triangles<S> {
-        let (v0, v1, v2) = (load(simd, &self.v0), load(simd, &self.v1), load(simd, &self.v2));
+        let [v0, v1, v2] = &self.vertices;
+        let (v0, v1, v2) = (load(simd, v0), load(simd, v1), load(simd, v2));
         let (e1, e2) = if exact { (minus(v1, v0), minus(v2, v0)) } else { (v1, v2) };
         Triangles { v0, e1, e2, size: self.size.simd_into(simd) }
     }
