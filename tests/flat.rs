@@ -13,6 +13,7 @@ use support::sweep::{Row, quantile, sweep};
 use truehit::glam::DVec2;
 use truehit::glam::DVec3;
 use truehit::glam::{DAffine3, DMat3, DQuat};
+use truehit::kernel::tally::Tally;
 use truehit::kernel::{eft, plane, polygon, slab, triangle};
 use truehit::{Affine, Cylinder, Hit, Interval, InvalidShape, Plane, Polygon, Ray, Shape, Sphere, Triangle};
 
@@ -402,6 +403,37 @@ fn comparisons_of_two_triangles_are_exact() {
     }
     println!("compare: less, equal, greater {seen:?}");
     assert!(seen.iter().all(|&n| n > 1000));
+}
+
+/// Overlapping faces, and rays through shared edges and vertices, are common in models: ties that short integers find.
+#[test]
+fn ties_of_short_coordinates_need_no_long_numbers() {
+    let mut r = Rng::named("ties");
+    let (before, mut compared) = (Tally::now(), 0);
+    for i in 0..9000 {
+        let t = [r.grid(60), r.grid(60), r.grid(60)];
+        let (e1, e2) = (t[1] - t[0], t[2] - t[0]);
+        let mut whole = || r.below(9) as f64 - 4.0;
+        let (in_plane, s, at);
+        match i % 3 {
+            0 => {
+                in_plane = [0; 3].map(|_| t[0] + whole() * e1 + whole() * e2);
+                (s, at) = (in_plane, t[0] + 0.3 * e1 + 0.3 * e2);
+            }
+            1 => (s, at) = ([r.grid(60), t[2], t[1]], t[1] + 0.25 * (t[2] - t[1])),
+            _ => (s, at) = ([r.grid(60), r.grid(60), t[1]], t[1]),
+        }
+        let origin = r.grid(50);
+        let ray = Ray::new(origin, at - origin);
+        let slanted = |t: &[DVec3; 3]| (t[1] - t[0]).cross(t[2] - t[0]).dot(ray.direction).abs() > 1e-6;
+        if slanted(&t) && slanted(&s) {
+            assert_eq!(triangle::compare(&ray, &t, &s), Ordering::Equal, "{ray:?} {t:?} {s:?}");
+            compared += 1;
+        }
+    }
+    println!("ties: {compared}");
+    assert!(compared > 7000);
+    assert_eq!(Tally::now().since(before).exact, 0);
 }
 
 /// Every family of `kernel`: nothing wrong, every bound holds, λ within the contract, both products the same bits.

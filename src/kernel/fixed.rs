@@ -99,6 +99,13 @@ pub(super) fn sides(ray: &Ray, &[a, b, c]: &[DVec3; 3]) -> Option<[Ordering; 3]>
     Some([su.sign(), sv.sign(), sw.sign()])
 }
 
+/// Whether two triangles lie in one plane, for certain: not known if the numbers are too long. All finite.
+pub(super) fn in_one_plane(&[a, b, c]: &[DVec3; 3], &[p, q, r]: &[DVec3; 3]) -> bool {
+    let Some([a, b, c, p, q, r]) = integers([a, b, c, p, q, r], BITS) else { return false };
+    let n = cross(difference(b, a), difference(c, a));
+    [p, q, r].into_iter().all(|v| dot(n, difference(v, a)).sign() == Ordering::Equal)
+}
+
 /// The sign of the edge function s(a, b), if the numbers are short enough; all finite.
 pub(super) fn edge(ray: &Ray, a: DVec3, b: DVec3) -> Option<Ordering> {
     let [o, a, b] = integers([ray.origin, a, b], BITS)?;

@@ -74,7 +74,8 @@ fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3;
     if (least < -bound) & (most > bound) {
         return None;
     }
-    if !(least > bound) {
+    let agreed = least > bound;
+    if !agreed {
         return closely(ray, vertices, within);
     }
 
@@ -351,10 +352,10 @@ pub fn precise_lambda(ray: &Ray, vertices: &[DVec3; 3]) -> [f64; 2] {
 #[inline(never)]
 #[must_use]
 pub fn compare(ray: &Ray, first: &[DVec3; 3], second: &[DVec3; 3]) -> Ordering {
-    if first == second {
+    tally::refined();
+    if fixed::in_one_plane(first, second) || meet_in_common(ray, first, second) {
         return Ordering::Equal;
     }
-    tally::refined();
     let (x, y): (Ratio<Bounded>, _) = (plane(ray, first), plane::<Bounded>(ray, second));
     let difference = x.numerator.times(&y.denominator).minus(&y.numerator.times(&x.denominator));
     if let (Some(sign), Some(x), Some(y)) = (difference.sign(), x.denominator.sign(), y.denominator.sign()) {
@@ -362,6 +363,21 @@ pub fn compare(ray: &Ray, first: &[DVec3; 3], second: &[DVec3; 3]) -> Ordering {
     }
     tally::exact();
     plane::<Dyadic>(ray, first).compare_exactly(&plane(ray, second))
+}
+
+/// Whether the ray, which meets both planes in one point each, meets both in one point of a vertex or an edge that they share.
+fn meet_in_common(ray: &Ray, first: &[DVec3; 3], second: &[DVec3; 3]) -> bool {
+    let on = |a: usize, b: usize| edge_sign(ray, first[a], first[b]) == Ordering::Equal;
+    match first.map(|v| second.contains(&v)) {
+        [true, true, true] => true,
+        [true, true, false] => on(0, 1),
+        [false, true, true] => on(1, 2),
+        [true, false, true] => on(2, 0),
+        [true, false, false] => on(0, 1) && on(0, 2),
+        [false, true, false] => on(1, 2) && on(1, 0),
+        [false, false, true] => on(2, 0) && on(2, 1),
+        [false, false, false] => false,
+    }
 }
 
 /// The exact sign of the edge function s(a, b) = d·((a−o)×(b−o)): on which side of the edge the ray passes.
