@@ -2,6 +2,7 @@
 
 use super::frame::Frame;
 use super::level::Level;
+use super::node::Node;
 use super::split::{self, Split};
 use super::tasks;
 use super::watch::Watch;
@@ -106,40 +107,6 @@ pub(super) fn half_area_of<S: Simd>(b: f32x8<S>) -> f32 {
 
 #[inline(always)]
 fn area_of_sides([x, y, z]: [f32; 3]) -> f32 {
-    x * y + y * z + z * x
-}
-
-/// A node of the binary tree. A leaf holds `count` items from `first`; an inner node (`count` = 0) has its children at
-/// `first` and `first` + 1.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
-pub(super) struct Node {
-    pub(super) min: [f32; 3],
-    pub(super) first: u32,
-    pub(super) max: [f32; 3],
-    pub(super) count: u32,
-}
-
-impl Node {
-    /// Nobody's child, and nobody's parent.
-    const VACANT: Self = Self { min: [0.0; 3], first: 0, max: [0.0; 3], count: u32::MAX };
-
-    #[inline(always)]
-    pub(super) fn is_leaf(&self) -> bool {
-        self.count > 0
-    }
-
-    #[inline(always)]
-    pub(super) fn half_area(&self) -> f32 {
-        half_area(&self.min, &self.max)
-    }
-}
-
-/// Half the surface of a box; infinite boxes have a large finite one, so that sums stay comparable.
-#[inline(always)]
-pub(super) fn half_area(min: &[f32; 3], max: &[f32; 3]) -> f32 {
-    let side = |i: usize| if max[i] - min[i] < 1e9 { max[i] - min[i] } else { 1e9 };
-    let (x, y, z) = (side(0), side(1), side(2));
     x * y + y * z + z * x
 }
 
@@ -269,7 +236,7 @@ impl Builder<'_, '_> {
         };
         if items.len() == 1 || few(items) || self.watch.stopped() {
             let (min, max) = bounds.corners();
-            return Node { min, first: at.item, max, count: items.len() as u32 };
+            return Node::new(min, max, at.item, items.len() as u32);
         }
         let split = dispatch!(self.level.token(), simd => split::split(simd, items, at.depth, self.leaf.ilog2()));
         self.inner(items, slots, bounds, at, &split)
@@ -295,6 +262,6 @@ impl Builder<'_, '_> {
             self.watch.add([mid, n - mid].into_iter().filter(|&n| n < PARALLEL).sum());
         }
         let (min, max) = bounds.corners();
-        Node { min, first: at.slot, max, count: 0 }
+        Node::new(min, max, at.slot, 0)
     }
 }

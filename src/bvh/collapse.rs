@@ -1,6 +1,7 @@
 //! From the binary tree to nodes of eight: the cut of least cost by dynamic programming (Ylitie, Karras, Laine 2017).
 
-use super::build::{Binary, Item, Node};
+use super::build::{Binary, Item};
+use super::node::Node;
 use super::reinsert;
 use super::tasks;
 use super::watch::Watch;
@@ -87,14 +88,14 @@ impl Plan {
         let node = &binary.nodes[at as usize];
         let area = node.half_area();
         if node.is_leaf() {
-            let items = &binary.items[node.first as usize..][..node.count as usize];
+            let items = &binary.items[node.first() as usize..][..node.count() as usize];
             self.sizes[at as usize].store(items.iter().map(Item::count).sum(), Relaxed);
             self.choices[at as usize].store(AS_LEAF, Relaxed);
             return [area; 7];
         }
         let below = |at| self.costs(binary, at, depth + 1);
-        let (l, r) = tasks::join(depth < PARALLEL_DEPTH, || below(node.first), || below(node.first + 1));
-        let size = self.size(node.first) + self.size(node.first + 1);
+        let (l, r) = tasks::join(depth < PARALLEL_DEPTH, || below(node.first()), || below(node.first() + 1));
+        let size = self.size(node.first()) + self.size(node.first() + 1);
         self.sizes[at as usize].store(size, Relaxed);
         let mut choices = 0u32;
         let mut costs = [0.0f32; 9];
@@ -140,7 +141,7 @@ impl Plan {
             children.push(at);
             return;
         }
-        let (first, k) = (nodes[at as usize].first, lanes_of_left(choices, lanes));
+        let (first, k) = (nodes[at as usize].first(), lanes_of_left(choices, lanes));
         self.expand(nodes, first, k, children);
         self.expand(nodes, first + 1, lanes - k, children);
     }
@@ -217,7 +218,7 @@ impl Part {
             let inner_from = work.len();
             for (lane, &child) in children.iter().enumerate() {
                 let node = &binary.nodes[child as usize];
-                wide.set_box(lane, node.min, node.max);
+                wide.set_box(lane, node.min(), node.max());
                 let word = if plan.is_leaf(child) {
                     let number = self.starts.len() as u32;
                     self.starts.push(self.objects.len() as u32);
@@ -225,11 +226,11 @@ impl Part {
                     while let Some(i) = below.pop() {
                         let node = &binary.nodes[i as usize];
                         if node.is_leaf() {
-                            for item in &binary.items[node.first as usize..][..node.count as usize] {
+                            for item in &binary.items[node.first() as usize..][..node.count() as usize] {
                                 self.objects.extend(item.objects());
                             }
                         } else {
-                            below.extend([node.first + 1, node.first]);
+                            below.extend([node.first() + 1, node.first()]);
                         }
                     }
                     LEAF | number

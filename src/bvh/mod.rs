@@ -11,6 +11,7 @@ mod bundle;
 mod collapse;
 mod frame;
 mod level;
+mod node;
 #[cfg(test)]
 mod quality;
 mod reinsert;

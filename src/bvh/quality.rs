@@ -1,7 +1,7 @@
 //! How good a tree is: its cost by the surface area heuristic, and what rays visit. Not a test of right or wrong.
 
-use super::build::half_area;
 use super::collapse::{Built, build};
+use super::node::Node;
 use super::watch::Watch;
 use super::wide::{LEAF, NONE};
 use crate::Aabb;
@@ -40,7 +40,7 @@ impl Traced<'_> {
                     continue;
                 }
                 let (min, max) = ([0, 2, 4].map(|a| node.rows[a][lane]), [1, 3, 5].map(|a| node.rows[a][lane]));
-                let area = f64::from(half_area(&min, &max));
+                let area = f64::from(Node::new(min, max, 0, 0).half_area());
                 if c & LEAF != 0 {
                     leaves += area;
                 } else {

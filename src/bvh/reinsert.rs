@@ -1,18 +1,25 @@
 //! Subtrees are moved to where they cost less (Meister and Bittner 2018, "Parallel reinsertion for bounding volume
 //! hierarchy optimization").
 //!
-//! In every pass the largest nodes look for their best place in the tree as it is, in parallel; the moves are then made
-//! one after the other, the best first, but for those that touch a node already touched. So the tree does not depend on
-//! the number of threads. Deviation: moves that would make the tree deeper than [`DEEPEST`] are left out.
+//! In every pass the largest nodes, the largest first, look for their best place in the tree as it is, some dozens of them in
+//! parallel; their moves are then made one after the other, the best first, but for those that touch a node already
+//! touched. So the tree does not depend on the number of threads. Deviations: few at a time, so that most find the tree as it will be;
+//! moves that would make the tree deeper than [`DEEPEST`] are left out.
 
-use super::build::{self, Node};
+use super::build;
+use super::node::Node;
 use super::tasks;
 use super::watch::Watch;
 use std::collections::BinaryHeap;
 
-/// Passes after which little is left to gain, and how many nodes, one in so many, look around in each.
-const PASSES: u32 = 6;
-const SHARE: usize = 20;
+/// In each pass one node in so many looks around; more do where the first ones have found something.
+const SHARES: [usize; 3] = [20, 10, 10];
+const STEPS: usize = 64;
+/// The last pass is one in which no more than one node in so many has found a better place.
+const CONTENT: usize = 32;
+/// Fewer are not worth a step, nor threads.
+const FEW: usize = 16;
+const PARALLEL: usize = 32;
 
 /// No leaf lies deeper than this.
 pub(super) const DEEPEST: u32 = build::DEEPEST + 32;
@@ -27,14 +34,17 @@ struct Move {
 
 /// Makes the tree cheaper in place; siblings stay in pairs.
 pub(super) fn reinsert(nodes: &mut [Node], watch: &Watch) {
-    watch.phase(0.8, PASSES as usize);
+    watch.phase(0.8, SHARES.len());
     if nodes.len() > 8 {
         let mut tree = Tree::new(nodes);
-        for _ in 0..PASSES {
+        for share in SHARES {
             if watch.stopped() {
                 return;
             }
-            tree.pass();
+            let chosen = tree.count.div_ceil(share);
+            if tree.pass(chosen) <= chosen / CONTENT {
+                break;
+            }
             watch.add(1);
         }
     }
@@ -45,10 +55,11 @@ struct Tree<'a> {
     parents: Vec<u32>,
     /// Levels below each node.
     heights: Vec<u8>,
-    /// How many nodes look around in a pass.
-    chosen: usize,
-    /// Nodes that this pass has changed.
+    /// How many nodes may look around.
+    count: usize,
+    /// Nodes that this step has changed, and which they are.
     touched: Vec<bool>,
+    changed: Vec<u32>,
 }
 
 impl<'a> Tree<'a> {
@@ -59,7 +70,7 @@ impl<'a> Tree<'a> {
         // Children lie after their parents.
         for (i, node) in nodes.iter().enumerate().rev() {
             if !node.is_leaf() {
-                let first = node.first as usize;
+                let first = node.first() as usize;
                 parents[first] = i as u32;
                 parents[first + 1] = i as u32;
                 heights[i] = 1 + heights[first].max(heights[first + 1]);
@@ -67,17 +78,17 @@ impl<'a> Tree<'a> {
             }
         }
         // The root's children have nowhere else to go.
-        let chosen = if count > 2 { (count - 2).div_ceil(SHARE) } else { 0 };
-        Self { nodes, parents, heights, chosen, touched: vec![false; n] }
+        let count = count.saturating_sub(2);
+        Self { nodes, parents, heights, count, touched: vec![false; n], changed: Vec::new() }
     }
 
-    /// The largest nodes but for the root and its children. No node is larger than its parent.
-    fn largest(&self) -> Vec<u32> {
+    /// The largest nodes, in order, but for the root and its children. No node is larger than its parent.
+    fn largest(&self, chosen: usize) -> Vec<u32> {
         // Areas are not negative, so their bits sort as they do.
         let key = |i: u32| u64::from(self.node(i).half_area().to_bits()) << 32 | u64::from(!i);
         let mut heap = BinaryHeap::from([key(0)]);
-        let mut largest = Vec::with_capacity(self.chosen);
-        while largest.len() < self.chosen
+        let mut largest = Vec::with_capacity(chosen);
+        while largest.len() < chosen
             && let Some(top) = heap.pop()
         {
             let i = !(top as u32);
@@ -86,23 +97,30 @@ impl<'a> Tree<'a> {
             }
             let node = self.node(i);
             if !node.is_leaf() {
-                heap.extend([key(node.first), key(node.first + 1)]);
+                heap.extend([key(node.first()), key(node.first() + 1)]);
             }
         }
-        // Neighbours one after the other.
-        largest.sort_unstable();
         largest
     }
 
-    fn pass(&mut self) {
-        let largest = self.largest();
-        let moves = tasks::map_with(largest.len(), Vec::new, |stack, i| self.best_move(largest[i], stack));
-        let mut moves: Vec<Move> = moves.into_iter().filter(|m| m.gain > 0.0).collect();
-        moves.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.from.cmp(&b.from)));
-        for m in &moves {
-            self.make(m);
+    /// How many of the `chosen` largest nodes have found a better place.
+    fn pass(&mut self, chosen: usize) -> usize {
+        let largest = self.largest(chosen);
+        let mut found = 0;
+        for step in largest.chunks((chosen / STEPS).max(FEW)) {
+            let search = |stack: &mut Vec<_>, i: usize| self.best_move(step[i], stack);
+            let moves = tasks::map_with(step.len() >= PARALLEL, step.len(), Vec::new, search);
+            let mut moves: Vec<Move> = moves.into_iter().filter(|m| m.gain > 0.0).collect();
+            moves.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.from.cmp(&b.from)));
+            found += moves.len();
+            for m in &moves {
+                self.make(m);
+            }
+            for i in self.changed.drain(..) {
+                self.touched[i as usize] = false;
+            }
         }
-        self.touched.fill(false);
+        found
     }
 
     fn node(&self, i: u32) -> &Node {
@@ -115,7 +133,7 @@ impl<'a> Tree<'a> {
 
     /// The best new place of `from`; no gain if there is none better than where it is.
     fn best_move(&self, from: u32, stack: &mut Vec<(f32, u32)>) -> Move {
-        let node = self.node(from);
+        let node = *self.node(from);
         let area = node.half_area();
         let parent = self.parent(from);
         let mut best = Move { gain: 0.0, from, to: 0 };
@@ -132,20 +150,20 @@ impl<'a> Tree<'a> {
                     continue;
                 }
                 let there = self.node(at);
-                let gain = left - union(there, node).half_area();
+                let gain = left - there.common_area(&node);
                 if gain > best.gain && at != from ^ 1 && at != parent {
                     best = Move { gain, from, to: at };
                 }
                 if !there.is_leaf() {
                     let left = gain + there.half_area();
                     if left - area > best.gain {
-                        stack.push((left, there.first + 1));
-                        stack.push((left, there.first));
+                        stack.push((left, there.first() + 1));
+                        stack.push((left, there.first()));
                     }
                 }
             }
             if above != parent {
-                rest = union(&rest, self.node(sibling));
+                rest = rest.union(self.node(sibling));
                 saved += self.node(above).half_area() - rest.half_area();
             }
             if above == 0 {
@@ -171,10 +189,11 @@ impl<'a> Tree<'a> {
         for i in changed {
             self.touched[i as usize] = true;
         }
+        self.changed.extend(changed);
         let (sibling, parent) = (from ^ 1, self.parent(from));
         let (stays, there) = (*self.node(sibling), *self.node(to));
         // The pair of `from` moves below `to`; what was at `to` becomes the other one of it.
-        self.nodes[to as usize] = Node { first: from & !1, count: 0, ..there };
+        self.nodes[to as usize] = there.above(from & !1);
         self.nodes[sibling as usize] = there;
         self.nodes[parent as usize] = stays;
         self.heights[parent as usize] = self.heights[sibling as usize];
@@ -182,8 +201,8 @@ impl<'a> Tree<'a> {
         for i in [sibling, parent] {
             let node = self.nodes[i as usize];
             if !node.is_leaf() {
-                self.parents[node.first as usize] = i;
-                self.parents[node.first as usize + 1] = i;
+                self.parents[node.first() as usize] = i;
+                self.parents[node.first() as usize + 1] = i;
             }
         }
         self.parents[sibling as usize] = to;
@@ -206,9 +225,8 @@ impl<'a> Tree<'a> {
         loop {
             let node = *self.node(at);
             if !node.is_leaf() {
-                let (l, r) = (node.first, node.first + 1);
-                let Node { min, max, .. } = union(self.node(l), self.node(r));
-                self.nodes[at as usize] = Node { min, max, ..node };
+                let (l, r) = (node.first(), node.first() + 1);
+                self.nodes[at as usize] = self.node(l).union(self.node(r)).above(l);
                 self.heights[at as usize] = 1 + self.heights[l as usize].max(self.heights[r as usize]);
             }
             if at == 0 {
@@ -216,17 +234,5 @@ impl<'a> Tree<'a> {
             }
             at = self.parent(at);
         }
-    }
-}
-
-/// `a` grown to hold `b`.
-#[inline(always)]
-fn union(a: &Node, b: &Node) -> Node {
-    let lesser = |x: f32, y: f32| if x < y { x } else { y };
-    let greater = |x: f32, y: f32| if x > y { x } else { y };
-    Node {
-        min: std::array::from_fn(|i| lesser(a.min[i], b.min[i])),
-        max: std::array::from_fn(|i| greater(a.max[i], b.max[i])),
-        ..*a
     }
 }
