@@ -1,12 +1,11 @@
 //! The binary tree: surface area heuristic, top down, in place and deterministic at any number of threads.
 
-use super::frame::Frame;
+use super::frame::{Frame, FrameBox};
 use super::level::Level;
 use super::node::Node;
 use super::split::{self, Split};
 use super::tasks;
 use super::watch::Watch;
-use crate::Aabb;
 use fearless_simd::{Simd, dispatch, f32x4, f32x8, prelude::*};
 use std::ops::Range;
 
@@ -22,11 +21,12 @@ const COUNT: u32 = 29;
 const LONGEST_RUN: u32 = 2;
 
 impl Item {
-    fn new(frame: &Frame, bounds: &Aabb, first: usize, count: u32) -> Self {
-        let ([x, y, z], [u, v, w]) = frame.outward(bounds);
+    #[inline(always)]
+    fn new(bounds: &FrameBox, first: usize, count: u32) -> Self {
+        let ([x, y, z, _], [u, v, w, _]) = (bounds.least.to_array(), bounds.most.to_array());
         let number = first as u32 | (count - 1) << COUNT;
         let (low, high) = ((number & 0xffff) as f32, (number >> 16) as f32);
-        Self(Box8([x, y, z, low, -u, -v, -w, high]))
+        Self(Box8([x, y, z, low, u, v, w, high]))
     }
 
     /// The numbers of its objects.
@@ -126,21 +126,20 @@ pub(super) const DEEPEST: u32 = 1 + split::DEEPEST_SAH + 32;
 const PARALLEL: usize = 4096;
 
 impl Binary {
-    /// The tree over objects 0..count, whose boxes, if finite, lie in `whole`.
+    /// The tree over objects 0..count, whose boxes in `frame` are given; empty ones hold no object.
     pub(super) fn new(
         count: usize,
-        whole: Aabb,
-        bounds: &(impl Fn(usize) -> Aabb + Sync),
+        frame: Frame,
+        bounds: &(impl Fn(usize) -> FrameBox + Sync),
         leaf: u32,
         watch: &Watch,
     ) -> Self {
         assert!(count < 1 << COUNT, "{count} objects are too many for one tree");
-        let frame = Frame::around(whole);
         let run = if leaf > 1 { LONGEST_RUN } else { 1 };
         watch.phase(0.2, count);
         let chunks = tasks::map(count.div_ceil(CHUNK), |chunk| {
             watch.add(CHUNK);
-            runs(chunk * CHUNK..count.min((chunk + 1) * CHUNK), &frame, bounds, run)
+            runs(chunk * CHUNK..count.min((chunk + 1) * CHUNK), bounds, run)
         });
         let mut items = chunks.concat();
         // Those of infinite size last.
@@ -174,35 +173,32 @@ const CHUNK: usize = 4096;
 
 /// Objects that follow each other and lie together, as a mesh's neighbouring triangles often do, are one item: their
 /// common box has at most this share of the surface of their own boxes.
-const TOGETHER: f64 = 0.7;
+const TOGETHER: f32 = 0.7;
 
-fn runs(objects: Range<usize>, frame: &Frame, bounds: &impl Fn(usize) -> Aabb, longest: u32) -> Vec<Item> {
-    let area = |b: &Aabb| {
-        let s = b.size() * frame.scale;
-        s.x * s.y + s.y * s.z + s.z * s.x
-    };
+fn runs(objects: Range<usize>, bounds: &impl Fn(usize) -> FrameBox, longest: u32) -> Vec<Item> {
     let mut items = Vec::with_capacity(objects.len());
-    let mut run = (Aabb::EMPTY, objects.start, 0, 0.0);
+    let mut run = (FrameBox::EMPTY, objects.start, 0, 0.0);
     for i in objects {
         let own = bounds(i);
-        if own.is_empty() && !own.min.is_nan() && !own.max.is_nan() {
-            // It holds nothing.
+        if own.is_empty() {
             continue;
         }
         let (common, first, count, sum) = run;
-        let (union, sum) = (common.union(own), sum + area(&own));
-        // Not if anything is infinite or NaN.
-        if first + count as usize == i && count < longest && area(&union) <= TOGETHER * sum {
+        let (union, area) = (common.union(&own), own.half_area());
+        let sum = sum + area;
+        // Not if anything is infinite, whose areas are too.
+        if first + count as usize == i && count < longest && union.half_area() <= TOGETHER * sum && sum < f32::INFINITY
+        {
             run = (union, first, count + 1, sum);
         } else {
             if count > 0 {
-                items.push(Item::new(frame, &common, first, count));
+                items.push(Item::new(&common, first, count));
             }
-            run = (own, i, 1, area(&own));
+            run = (own, i, 1, area);
         }
     }
     if run.2 > 0 {
-        items.push(Item::new(frame, &run.0, run.1, run.2));
+        items.push(Item::new(&run.0, run.1, run.2));
     }
     items
 }

@@ -1,12 +1,12 @@
 //! From the binary tree to nodes of eight: the cut of least cost by dynamic programming (Ylitie, Karras, Laine 2017).
 
 use super::build::{Binary, Item};
+use super::frame::{Frame, FrameBox};
 use super::node::Node;
 use super::reinsert;
 use super::tasks;
 use super::watch::Watch;
 use super::wide::{LEAF, Wide, WideNode};
-use crate::Aabb;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// A tree and what its leaves hold.
@@ -19,18 +19,18 @@ pub(crate) struct Built {
     pub(crate) starts: Vec<u32>,
 }
 
-/// The tree over objects 0..count with the boxes given, which lie in `whole` if they are finite, with at most `leaf` of
-/// them in a leaf.
+/// The tree over objects 0..count with the boxes given in `frame`, empty ones for no object, with at most `leaf` of them
+/// in a leaf.
 ///
 /// `None` if `watch` has stopped it; a tenth of its time is left to the caller.
 pub(crate) fn build(
     count: usize,
-    whole: Aabb,
-    bounds: &(impl Fn(usize) -> Aabb + Sync),
+    frame: Frame,
+    bounds: &(impl Fn(usize) -> FrameBox + Sync),
     leaf: u32,
     watch: &Watch,
 ) -> Option<Built> {
-    let mut binary = Binary::new(count, whole, bounds, leaf, watch);
+    let mut binary = Binary::new(count, frame, bounds, leaf, watch);
     reinsert::reinsert(&mut binary.nodes, watch);
     watch.phase(0.9, 1);
     if watch.stopped() {

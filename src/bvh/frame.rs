@@ -2,7 +2,7 @@
 
 use crate::Aabb;
 use crate::kernel::float::{exponent_of, ldexp};
-use glam::DVec3;
+use glam::{DVec3, Vec4, Vec4Swizzles};
 
 /// x ↦ (x − `center`)·2^−`exponent`.
 ///
@@ -76,19 +76,71 @@ impl Frame {
     }
 
     /// The f32 box around the box `b`: infinite if `b` is not finite, or not a box.
-    pub(crate) fn outward(&self, b: &Aabb) -> ([f32; 3], [f32; 3]) {
+    pub(crate) fn outward(&self, b: &Aabb) -> FrameBox {
         if b.is_empty() || !b.is_finite() {
-            return ([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
+            return FrameBox { least: Vec4::NEG_INFINITY, most: Vec4::NEG_INFINITY };
         }
         let (lo, hi) = (self.local(b.min), self.local(b.max));
         // The subtraction's rounding; exact about the origin.
         let slack = |v: f64, c: f64| if c == 0.0 { 0.0 } else { v.abs() * f64::EPSILON };
-        let mut out = ([0.0; 3], [0.0; 3]);
-        for i in 0..3 {
-            out.0[i] = down(lo[i] - slack(lo[i], self.center[i]));
-            out.1[i] = up(hi[i] + slack(hi[i], self.center[i]));
+        let least = |i: usize| down(lo[i] - slack(lo[i], self.center[i]));
+        let most = |i: usize| down(-hi[i] - slack(hi[i], self.center[i]));
+        FrameBox {
+            least: Vec4::new(least(0), least(1), least(2), 0.0),
+            most: Vec4::new(most(0), most(1), most(2), 0.0),
         }
-        out
+    }
+
+    /// `x` in the frame, rounded to the nearest f32.
+    #[inline(always)]
+    pub(crate) fn nearest(&self, x: DVec3) -> Vec4 {
+        let x = self.local(x);
+        Vec4::new(x.x as f32, x.y as f32, x.z as f32, 0.0)
+    }
+}
+
+/// A box in the frame: its least corner, and its greatest one negated, so that growing it is two minima. The fourth
+/// coordinates are anything.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FrameBox {
+    pub(crate) least: Vec4,
+    pub(crate) most: Vec4,
+}
+
+impl FrameBox {
+    /// Holds nothing.
+    pub(crate) const EMPTY: Self = Self { least: Vec4::INFINITY, most: Vec4::INFINITY };
+
+    #[inline(always)]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.least.x == f32::INFINITY
+    }
+
+    /// Around three points that are what they seem.
+    #[inline(always)]
+    pub(crate) fn around(a: Vec4, b: Vec4, c: Vec4) -> Self {
+        Self { least: a.min(b).min(c), most: -a.max(b).max(c) }
+    }
+
+    /// Around everything that [`Frame::nearest`] takes to a point in it; inside [−1, 1]³.
+    #[inline(always)]
+    pub(crate) fn widened(&self) -> Self {
+        // Four times half an ulp: the rounding to the nearest, the one here, and the frame's.
+        let wider = |x: Vec4| (x - (x.abs() * (2.0 * f32::EPSILON) + Vec4::splat(1e-30))).max(Vec4::NEG_ONE);
+        Self { least: wider(self.least), most: wider(self.most) }
+    }
+
+    #[inline(always)]
+    pub(crate) fn union(&self, other: &Self) -> Self {
+        Self { least: self.least.min(other.least), most: self.most.min(other.most) }
+    }
+
+    /// Half the surface; infinite for an infinite box.
+    #[inline(always)]
+    pub(crate) fn half_area(&self) -> f32 {
+        let sides = self.least + self.most;
+        let p = sides * sides.yzxw();
+        p.x + p.y + p.z
     }
 }
 
@@ -101,12 +153,6 @@ pub(crate) fn down(x: f64) -> f32 {
     let below = if f == 0.0 { i32::MIN + 1 } else { bits - (bits >> 31 | 1) };
     let rounded = f32::from_bits(if f64::from(f) > x { below } else { bits } as u32);
     if x.is_nan() { f32::NEG_INFINITY } else { rounded }
-}
-
-/// The smallest f32 that is not below `x`; ∞ for NaN.
-#[inline(always)]
-pub(crate) fn up(x: f64) -> f32 {
-    -down(-x)
 }
 
 #[cfg(test)]
@@ -124,8 +170,11 @@ mod tests {
             let min = DVec3::from(at) * 2f64.powi(offset);
             let b = Aabb::new(min, min + DVec3::from(size) * 2f64.powi(scale));
             let frame = Frame::around(b);
-            let (lo, hi) = frame.outward(&b);
+            let FrameBox { least: lo, most } = frame.outward(&b);
+            let hi = -most;
+            let near = FrameBox::around(frame.nearest(b.min), frame.nearest(b.max), frame.nearest(b.min)).widened();
             for i in 0..3 {
+                prop_assert!(-1.0 <= near.least[i] && near.least[i] <= lo[i] && hi[i] <= -near.most[i] && near.most[i] >= -1.0);
                 let exact = |x: f64| Dyadic::difference(x, frame.center[i]).shifted(-frame.exponent);
                 let below = exact(b.min[i]).minus(&f64::from(lo[i]).into());
                 let above = Dyadic::exactly(f64::from(hi[i])).minus(&exact(b.max[i]));
@@ -145,7 +194,8 @@ mod tests {
             Aabb::new([5e-324; 3], [1e-323; 3]),
         ] {
             let frame = Frame::around(b);
-            let (lo, hi) = frame.outward(&b);
+            let FrameBox { least: lo, most } = frame.outward(&b);
+            let hi = -most;
             assert!((0..3).all(|i| -1.0 <= lo[i] && lo[i] <= hi[i] && hi[i] <= 1.0), "{b:?} {lo:?} {hi:?}");
         }
     }

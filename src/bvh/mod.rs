@@ -26,7 +26,7 @@ pub use level::Level;
 
 pub(crate) use bundle::{Bundle, RAYS, Together, together};
 pub(crate) use collapse::build;
-pub(crate) use frame::Frame;
+pub(crate) use frame::{Frame, FrameBox};
 pub(crate) use slab::{E, Limits, LocalRay, PLAIN_ERROR, Sure};
 pub(crate) use tasks::map;
 pub(crate) use traverse::{Any, Closest, Lanes, any, closest};
@@ -87,7 +87,13 @@ impl Bvh {
     fn build_watched(boxes: &[Aabb], watch: &Watch) -> Option<Self> {
         let sound = boxes.iter().filter(|b| b.is_finite() && !b.is_empty());
         let whole = sound.fold(Aabb::EMPTY, |whole, &b| whole.union(b));
-        let built = build(boxes.len(), whole, &|i| boxes[i], OBJECTS_PER_LEAF, watch)?;
+        let frame = Frame::around(whole);
+        let bounds = |i: usize| {
+            let b: &Aabb = &boxes[i];
+            let empty = b.is_empty() && !b.min.is_nan() && !b.max.is_nan();
+            if empty { FrameBox::EMPTY } else { frame.outward(b) }
+        };
+        let built = build(boxes.len(), frame, &bounds, OBJECTS_PER_LEAF, watch)?;
         watch.phase(1.0, 1);
         watch.add(1);
         if watch.stopped() {

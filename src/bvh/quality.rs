@@ -1,6 +1,7 @@
 //! How good a tree is: its cost by the surface area heuristic, and what rays visit. Not a test of right or wrong.
 
 use super::collapse::{Built, build};
+use super::frame::{Frame, FrameBox};
 use super::node::Node;
 use super::watch::Watch;
 use super::wide::{LEAF, NONE};
@@ -159,7 +160,13 @@ fn on_one_thread(work: impl FnOnce() + Send) {
 fn report(name: &str, parts: &Parts, rays: usize) {
     let corners = |i: usize| parts.1[i].map(|v| parts.0[v as usize]);
     let whole = Aabb::around(&parts.0);
-    let again = || build(parts.1.len(), whole, &|i| Aabb::around(&corners(i)), 8, &Watch::nobody());
+    let frame = Frame::around(whole);
+    let points: Vec<_> = parts.0.iter().map(|&p| frame.nearest(p)).collect();
+    let bounds = |i: usize| {
+        let [a, b, c] = parts.1[i].map(|v| points[v as usize]);
+        FrameBox::around(a, b, c).widened()
+    };
+    let again = || build(parts.1.len(), frame, &bounds, 8, &Watch::nobody());
     let built = again().expect("nobody stops it");
     let mut least = f64::INFINITY;
     let times = 200_000 / parts.1.len() + 1;

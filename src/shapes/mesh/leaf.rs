@@ -5,51 +5,28 @@
 //! docs/numerics.md §10.
 
 use super::Mesh;
-use crate::Aabb;
-use crate::bvh::{self, Bundle, E, Frame, LocalRay, PLAIN_ERROR, Wide};
+use crate::bvh::{Bundle, E, LocalRay, PLAIN_ERROR};
 use fearless_simd::{Simd, f32x8, prelude::*};
 use glam::DVec3;
 
 /// Triangles have 29 bits for their number.
 pub(super) const MOST_TRIANGLES: usize = 1 << 29;
 const NUMBER: u32 = (1 << 29) - 1;
-const ROTATION: u32 = 29;
+pub(super) const ROTATION: u32 = 29;
 
 /// Up to eight triangles, with v₀ opposite the longest edge.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(super) struct Leaf {
     /// v₀, v₁ and v₂ where they are the mesh's own, exactly; else v₀, e₁ = v₁ − v₀ and e₂ = v₂ − v₀, which lose less.
-    vertices: [[[f32; 8]; 3]; 3],
+    pub(super) vertices: [[[f32; 8]; 3]; 3],
     /// Not below |e₁| + |e₂|; −1 in a lane that holds no triangle.
-    size: [f32; 8],
+    pub(super) size: [f32; 8],
     /// The triangle's number, and by how many places its vertices are rotated.
-    id: [u32; 8],
+    pub(super) id: [u32; 8],
 }
 
 impl Leaf {
-    const EMPTY: Self = Self { vertices: [[[0.0; 8]; 3]; 3], size: [-1.0; 8], id: [0; 8] };
-
-    /// Puts triangle `number` into a lane.
-    fn set(&mut self, lane: usize, frame: &Frame, exact: bool, vertices: &[DVec3; 3], number: u32) {
-        let lengths = [0, 1, 2].map(|i| {
-            let e = frame.local_difference(vertices[(i + 2) % 3], vertices[(i + 1) % 3]);
-            e.length_squared()
-        });
-        let rotation = (0..3).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
-        let [a, b, c] = [0, 1, 2].map(|i| vertices[(i + rotation) % 3]);
-        let (v0, e1, e2) = (frame.local(a), frame.local_difference(b, a), frame.local_difference(c, a));
-        let (v1, v2) = if exact { (frame.local(b), frame.local(c)) } else { (e1, e2) };
-        for i in 0..3 {
-            for (rows, v) in self.vertices.iter_mut().zip([v0, v1, v2]) {
-                rows[i][lane] = v[i] as f32;
-            }
-        }
-        // Two square roots and a sum in f64, and one rounding to f32.
-        self.size[lane] = ((e1.length() + e2.length()) * (1.0 + 2.0 * f64::from(E))) as f32;
-        self.id[lane] = number | (rotation as u32) << ROTATION;
-    }
-
     #[inline(always)]
     pub(super) fn number(&self, lane: usize) -> u32 {
         self.id[lane] & NUMBER
@@ -65,46 +42,6 @@ impl Leaf {
         let first = 3 - (self.id[lane] >> ROTATION) as usize;
         [first, first + 1, first + 2].map(|i| mesh.frame().world(column(&self.vertices[i % 3], lane)))
     }
-}
-
-/// The tree over the triangles, its leaves, whether these hold the vertices exactly, and the box around all; `None` if
-/// `watch` has stopped it.
-pub(super) fn build(
-    positions: &[DVec3],
-    triangles: &[[u32; 3]],
-    watch: &bvh::Watch,
-) -> Option<(Wide, Vec<Leaf>, bool, Aabb)> {
-    let corners = |i: usize| triangles[i].map(|v| positions[v as usize]);
-    let bounds = |i: usize| {
-        let t = &triangles[i];
-        // A triangle of two points is never hit.
-        if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
-            return Aabb::EMPTY;
-        }
-        Aabb::around(&corners(i))
-    };
-    let whole = triangles.iter().flatten().fold(Aabb::EMPTY, |b, &v| {
-        let p = positions[v as usize];
-        b.union(Aabb { min: p, max: p })
-    });
-    let built = bvh::build(triangles.len(), whole, &bounds, 8, watch)?;
-    let frame = &built.tree.frame;
-    let exact = positions.iter().all(|&p| frame.world(frame.local(p).as_vec3().as_dvec3()) == p);
-    let count = built.starts.len() - 1;
-    watch.phase(1.0, count);
-    let leaves = bvh::map(count, |i| {
-        let mut leaf = Leaf::EMPTY;
-        let (from, to) = (built.starts[i] as usize, built.starts[i + 1] as usize);
-        for (lane, &number) in built.objects[from..to].iter().enumerate() {
-            leaf.set(lane, frame, exact, &corners(number as usize), number);
-        }
-        if i % 1024 == 1023 {
-            watch.add(1024);
-        }
-        leaf
-    });
-    watch.add(count);
-    (!watch.stopped()).then_some((built.tree, leaves, exact, whole))
 }
 
 /// The ray as the filter wants it: in f32, with the margins' constants.

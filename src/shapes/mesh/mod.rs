@@ -4,6 +4,7 @@
 //! lost); [`kernel::triangle`] decides them exactly and gives λ.
 
 mod attributes;
+mod build;
 mod each;
 mod leaf;
 mod query;
@@ -11,6 +12,7 @@ mod query;
 use crate::bvh::{Frame, Level, Watch, Wide};
 use crate::kernel::triangle;
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
+use build::Built;
 use glam::{DAffine3, DVec2, DVec3};
 use leaf::Leaf;
 use std::ops::ControlFlow;
@@ -89,14 +91,18 @@ impl Mesh {
             return Err(InvalidShape::TooMany { field: "triangles", given: triangles.len() });
         }
         let count = positions.len();
+        let mut used = vec![false; count];
         for (at, t) in triangles.iter().enumerate() {
-            if let Some(&index) = t.iter().find(|&&i| i as usize >= count) {
-                return Err(InvalidShape::IndexOutOfRange { field: "triangles", at, index, count });
+            for &index in t {
+                let Some(used) = used.get_mut(index as usize) else {
+                    return Err(InvalidShape::IndexOutOfRange { field: "triangles", at, index, count });
+                };
+                *used = true;
             }
         }
-        let built = leaf::build(&positions, &triangles, watch);
-        let Some((tree, leaves, exact, bounds)) = built else { return Err(InvalidShape::Cancelled) };
         let level = Level::detect();
+        let built = build::build(&positions, &triangles, &used, level, watch);
+        let Some(Built { tree, leaves, exact, bounds }) = built else { return Err(InvalidShape::Cancelled) };
         Ok(Self { positions, triangles, normals: Vec::new(), uvs: Vec::new(), bounds, tree, leaves, exact, level })
     }
 

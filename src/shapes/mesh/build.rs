@@ -1,0 +1,140 @@
+//! The tree over a mesh's triangles, and its leaves.
+
+use super::leaf::{Leaf, ROTATION};
+use crate::Aabb;
+use crate::bvh::{self, E, Frame, FrameBox, Level, Wide};
+use fearless_simd::{Simd, dispatch, f32x8, prelude::*, u32x8};
+use glam::{DVec3, Vec4};
+
+pub(super) struct Built {
+    pub(super) tree: Wide,
+    pub(super) leaves: Vec<Leaf>,
+    /// The leaves hold the vertices themselves, not rounded ones.
+    pub(super) exact: bool,
+    /// Around all triangles.
+    pub(super) bounds: Aabb,
+}
+
+/// `None` if `watch` has stopped it. Each position is moved into the frame once, whatever the number of its triangles.
+pub(super) fn build(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    used: &[bool],
+    level: Level,
+    watch: &bvh::Watch,
+) -> Option<Built> {
+    let bounds = positions.iter().zip(used).filter(|(_, used)| **used).fold(Aabb::EMPTY, |b, (&p, _)| grown(b, p));
+    let frame = Frame::around(bounds);
+    let mut points = bvh::map(positions.len(), |i| {
+        let point = frame.nearest(positions[i]);
+        // The fourth coordinate says whether it is another point.
+        let changed = frame.world(point.truncate().as_dvec3()) != positions[i];
+        point.with_w(f32::from(u8::from(changed)))
+    });
+    let exact = points.iter().all(|p| p.w == 0.0);
+    // The frame's own subtraction may round.
+    let wide = !exact || frame.center != DVec3::ZERO;
+    let boxes = |i: usize| {
+        let t = &triangles[i];
+        // A triangle of two points is never hit.
+        if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
+            return FrameBox::EMPTY;
+        }
+        let [a, b, c] = t.map(|v| points[v as usize]);
+        let b = FrameBox::around(a, b, c);
+        if wide { b.widened() } else { b }
+    };
+    let built = bvh::build(triangles.len(), frame, &boxes, 8, watch)?;
+    if !exact {
+        // Edges are not formed from rounded vertices.
+        points = Vec::new();
+    }
+    let count = built.starts.len() - 1;
+    watch.phase(1.0, count);
+    let leaves = bvh::map(count, |i| {
+        let numbers = &built.objects[built.starts[i] as usize..built.starts[i + 1] as usize];
+        if i % 1024 == 1023 {
+            watch.add(1024);
+        }
+        if exact {
+            dispatch!(level.token(), simd => of_points(simd, &points, triangles, numbers))
+        } else {
+            of_edges(&frame, positions, triangles, numbers)
+        }
+    });
+    watch.add(count);
+    (!watch.stopped()).then_some(Built { tree: built.tree, leaves, exact, bounds })
+}
+
+fn grown(b: Aabb, p: DVec3) -> Aabb {
+    b.union(Aabb { min: p, max: p })
+}
+
+const EMPTY: Leaf = Leaf { vertices: [[[0.0; 8]; 3]; 3], size: [-1.0; 8], id: [0; 8] };
+
+/// The leaf of triangles whose vertices in the frame are floats.
+#[inline(always)]
+fn of_points<S: Simd>(simd: S, points: &[Vec4], triangles: &[[u32; 3]], numbers: &[u32]) -> Leaf {
+    let mut leaf = EMPTY;
+    // No triangle's size is more, or less.
+    let mut most = [-1.0; 8];
+    for (lane, &number) in numbers.iter().enumerate().take(8) {
+        for (rows, v) in leaf.vertices.iter_mut().zip(triangles[number as usize]) {
+            let [x, y, z, _] = points[v as usize].to_array();
+            (rows[0][lane], rows[1][lane], rows[2][lane]) = (x, y, z);
+        }
+        leaf.id[lane] = number;
+        most[lane] = f32::INFINITY;
+    }
+    let load = |rows: &[[f32; 8]; 3]| -> [f32x8<S>; 3] {
+        [rows[0].simd_into(simd), rows[1].simd_into(simd), rows[2].simd_into(simd)]
+    };
+    let [a, b, c] = [load(&leaf.vertices[0]), load(&leaf.vertices[1]), load(&leaf.vertices[2])];
+    let square = |p: [f32x8<S>; 3], q: [f32x8<S>; 3]| {
+        let (x, y, z) = (p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+        x * x + y * y + z * z
+    };
+    let (of_a, of_b, of_c) = (square(c, b), square(a, c), square(b, a));
+    // Which vertex comes first: b, c, or else a.
+    let last = of_c.simd_gt(of_a.max(of_b));
+    let middle = of_b.simd_gt(of_a) & !last;
+    let pick = |p: f32x8<S>, q: f32x8<S>, r: f32x8<S>| last.select(r, middle.select(q, p));
+    for i in 0..3 {
+        leaf.vertices[0][i] = pick(a[i], b[i], c[i]).into();
+        leaf.vertices[1][i] = pick(b[i], c[i], a[i]).into();
+        leaf.vertices[2][i] = pick(c[i], a[i], b[i]).into();
+    }
+    let lengths = pick(of_b, of_c, of_a).sqrt() + pick(of_c, of_a, of_b).sqrt();
+    // Differences, squares, sums, roots, the last sum and these two: less than 8 roundings; and squares that underflow.
+    let size = lengths * f32x8::splat(simd, 1.0 + 16.0 * E) + f32x8::splat(simd, 2e-22);
+    let most: f32x8<S> = most.simd_into(simd);
+    leaf.size = size.min(most).into();
+    let id: u32x8<S> = leaf.id.simd_into(simd);
+    let turned = |places: u32| u32x8::splat(simd, places << ROTATION);
+    leaf.id = (id | last.select(turned(2), middle.select(turned(1), turned(0)))).into();
+    leaf
+}
+
+/// The leaf of any triangles: edges are worked out in f64.
+fn of_edges(frame: &Frame, positions: &[DVec3], triangles: &[[u32; 3]], numbers: &[u32]) -> Leaf {
+    let mut leaf = EMPTY;
+    for (lane, &number) in numbers.iter().enumerate() {
+        let vertices = triangles[number as usize].map(|v| positions[v as usize]);
+        let lengths = [0, 1, 2].map(|i| {
+            let e = frame.local_difference(vertices[(i + 2) % 3], vertices[(i + 1) % 3]);
+            e.length_squared()
+        });
+        let rotation = (0..3).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
+        let [a, b, c] = [0, 1, 2].map(|i| vertices[(i + rotation) % 3]);
+        let (v0, e1, e2) = (frame.local(a), frame.local_difference(b, a), frame.local_difference(c, a));
+        for (rows, v) in leaf.vertices.iter_mut().zip([v0, e1, e2]) {
+            for i in 0..3 {
+                rows[i][lane] = v[i] as f32;
+            }
+        }
+        // Two square roots and a sum in f64, and one rounding to f32.
+        leaf.size[lane] = ((e1.length() + e2.length()) * (1.0 + 2.0 * f64::from(E))) as f32;
+        leaf.id[lane] = number | (rotation as u32) << ROTATION;
+    }
+    leaf
+}
