@@ -161,11 +161,10 @@ impl Tally {
                     self.fail("shadow ray re-hit", &case, map.as_ref(), direction);
                 }
             }
-            if outward && direction.dot(n) > 1e-3 * direction.length() {
-                if !other.occludes(&spawned, Interval::FORWARD) {
-                    self.skipped += 1;
-                    self.fail("skipped", &case, map.as_ref(), direction);
-                }
+            let steep = direction.dot(n) > 1e-3 * direction.length();
+            if outward && steep && !other.occludes(&spawned, Interval::FORWARD) {
+                self.skipped += 1;
+                self.fail("skipped", &case, map.as_ref(), direction);
             }
         }
     }
