@@ -76,6 +76,20 @@ pub type FusedLanes = fearless_simd::f64x4<fearless_simd::Neon>;
 #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
 pub type FusedLanes = super::lanes::Plain;
 
+/// The proof that there is fused multiply-add, if [`has_fused`].
+#[inline(always)]
+pub(super) fn fused_lanes_of<S: Simd>(simd: S) -> Option<<FusedLanes as Lanes>::Cpu> {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    return simd.level().as_avx2();
+    #[cfg(target_arch = "aarch64")]
+    return simd.level().as_neon();
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
+    {
+        let _ = simd;
+        None
+    }
+}
+
 /// The proof that there is fused multiply-add.
 ///
 /// # Panics

@@ -114,14 +114,19 @@ impl<L: Lanes> Double<L> {
         Self { hi, lo }
     }
 
-    /// self × other: with M the product of the largest components |lo| ≤ 8.1uM, off by 28u²M.
+    /// self × other: with M the product of the largest components |lo| ≤ 8.1uM, off by 28u²M. If both are `plain`, their
+    /// low parts zero, these cost nothing.
     #[inline(always)]
-    pub(super) fn cross(self, other: Self) -> Self {
+    pub(super) fn cross(self, other: Self, plain: bool) -> Self {
         let (at, bt) = (self.hi.turned(), other.hi.turned());
         let ((p, p_lo), (m, m_lo)) = (self.hi.two_product(bt), at.two_product(other.hi));
         let (hi, rounding) = two_diff(p, m);
-        let (forth, back) = (self.hi * other.lo.turned() + self.lo * bt, at * other.lo + self.lo.turned() * other.hi);
-        let lo = ((p_lo - m_lo) + rounding) + (forth - back);
+        let mut lo = (p_lo - m_lo) + rounding;
+        if !plain {
+            let (forth, back) =
+                (self.hi * other.lo.turned() + self.lo * bt, at * other.lo + self.lo.turned() * other.hi);
+            lo = lo + (forth - back);
+        }
         Self { hi: hi.turned(), lo: lo.turned() }
     }
 

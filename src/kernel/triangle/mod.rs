@@ -16,6 +16,7 @@ use crate::kernel::number::{self, Number, cross, difference, dot, vector};
 use crate::kernel::ratio::{self, Ratio};
 use crate::kernel::tally;
 use crate::{Hit, Interval, Ray};
+use fearless_simd::Simd;
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
 
@@ -50,26 +51,14 @@ pub fn intersect_with<P: Product>(ray: &Ray, vertices: &[DVec3; 3], within: Inte
 
 #[inline(always)]
 fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3; 3], within: &Interval) -> Option<Hit> {
-    let lanes = |v: DVec3| P::Lanes::of(cpu, v);
-    let (o, d, [a, b, c]) = (lanes(ray.origin), lanes(ray.direction), vertices.map(lanes));
-    // u·e₁ + v·e₂ − λ·d = s
-    let (e1, e2, s) = (Double::difference(b, a), Double::difference(c, a), Double::difference(o, a));
-    let (n, q) = (e1.cross(e2), d.cross(s.hi));
-    let (nd, ns) = (n.times_float(d), n.times(s));
-    let [x, y, z] = Lanes::columns([nd.hi, ns.hi, q * e2.hi, q * e1.hi]);
-    let (xy, rounding) = two_sum(x, y);
-    let (forms, more_rounding) = two_sum(xy, z);
-    let [det, height, su, minus_sv] = forms.to_array();
-
-    let (sizes, m_d_s) = Sizes::new([d, s.hi, e1.hi, e2.hi]);
-    let size = sizes.of_sides();
+    let products = Products::<P>::new(cpu, ray, vertices, false);
+    let &Products { det, su, sv, ref sizes, .. } = &products;
     if !sizes.are_ordinary() {
         return closely(ray, vertices, within);
     }
-    let bound = TRIANGLE_SIDES * size + VANISHED;
-    let (sv, sw) = (-minus_sv, (det - su) + minus_sv);
+    let bound = TRIANGLE_SIDES * sizes.of_sides() + VANISHED;
     // Turned to the ray: a branch on the orientation would be foretold by nothing.
-    let (least, most) = extremes(su, sv, sw);
+    let (least, most) = extremes(su, sv, (det - su) - sv);
     let (least, most) = if det < 0.0 { (-most, -least) } else { (least, most) };
     if (least < -bound) & (most > bound) {
         return None;
@@ -78,30 +67,108 @@ fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3;
     if !agreed {
         return closely(ray, vertices, within);
     }
-
-    // Proved before it is computed: neither D nor N has lost more than 18 of its bits.
-    let (sums, least) = (forms.low().abs(), m_d_s * m_d_s.splat(sizes.m12));
-    let least = least + least.splat(TRIANGLE_CONDITION * PRESENT);
-    let known = (sums * sums.splat(TRIANGLE_CONDITION)).is_between(least, TRIANGLE_CONDITION / PRESENT);
     // Begun early: what follows waits for it.
     let inverse = 1.0 / det;
-    if !known || bound * inverse.abs() > WEIGHT {
+    if !products.are_known() || bound * inverse.abs() > WEIGHT {
         return closely(ray, vertices, within);
     }
-    let first = -height * inverse;
-    let error = (U + TRIANGLE_LAMBDA) * first.abs();
-    let [lx, ly, lz] = nd.lo.rows(ns.lo);
-    let [det_lo, height_lo] = ((rounding + more_rounding).low() + ((lx + ly) + lz)).to_array();
-    let remainder = P::remainder(height, -first, det) + (height_lo + first * det_lo);
-    let lambda = first - remainder * inverse;
-    if (lambda - error > within.min) & (lambda + error < within.max) {
-        // Positive, and rounded above one at most.
-        return Some(Hit { lambda, error, uv: DVec2::new(su * inverse, sv * inverse).min(DVec2::ONE), part: 0 });
+    let hit = products.hit(inverse);
+    let (from, to) = (hit.lambda - hit.error, hit.lambda + hit.error);
+    if (from > within.min) & (to < within.max) {
+        return Some(hit);
     }
-    if (lambda + error < within.min) | (lambda - error > within.max) {
+    if (to < within.min) | (from > within.max) {
         return None;
     }
     closely(ray, vertices, within)
+}
+
+/// The hit of a ray that is known to meet the triangle at a λ that counts, to the bit as [`intersect_with`] has it; `None` where
+/// that would leave its fast path. `plain`: b − a and c − a are vectors of floats. For code that was dispatched to the instructions of `simd`.
+#[inline(always)]
+#[must_use]
+pub fn passed<S: Simd>(simd: S, ray: &Ray, vertices: &[DVec3; 3], plain: bool) -> Option<Hit> {
+    match cpu::fused_lanes_of(simd) {
+        Some(cpu) => hit_of_passed::<Fused>(cpu, ray, vertices, plain),
+        None => hit_of_passed::<Split>((), ray, vertices, plain),
+    }
+}
+
+#[inline(always)]
+fn hit_of_passed<P: Product>(
+    cpu: <P::Lanes as Lanes>::Cpu,
+    ray: &Ray,
+    vertices: &[DVec3; 3],
+    plain: bool,
+) -> Option<Hit> {
+    let products = Products::<P>::new(cpu, ray, vertices, plain);
+    let bound = TRIANGLE_SIDES * products.sizes.of_sides() + VANISHED;
+    let inverse = 1.0 / products.det;
+    let certain = products.sizes.are_ordinary() & (bound * inverse.abs() <= WEIGHT);
+    (certain && products.are_known()).then(|| products.hit(inverse))
+}
+
+/// Whether b − a and c − a are vectors of floats.
+#[cfg(test)]
+pub(crate) fn has_plain_edges(&[a, b, c]: &[DVec3; 3]) -> bool {
+    [b, c].into_iter().all(|v| (0..3).all(|i| two_diff(v[i], a[i]).1 == 0.0))
+}
+
+/// The triple products D, n·s, s(c,a), s(a,b).
+struct Products<P: Product> {
+    det: f64,
+    height: f64,
+    su: f64,
+    sv: f64,
+    /// What D and n·s have beyond that.
+    low: <P::Lanes as Lanes>::Half,
+    /// |D| and |n·s|.
+    present: <P::Lanes as Lanes>::Half,
+    sizes: Sizes,
+    /// The largest components of d and s.
+    m_d_s: <P::Lanes as Lanes>::Half,
+}
+
+impl<P: Product> Products<P> {
+    #[inline(always)]
+    fn new(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3; 3], plain: bool) -> Self {
+        let lanes = |v: DVec3| P::Lanes::of(cpu, v);
+        let (o, d, [a, b, c]) = (lanes(ray.origin), lanes(ray.direction), vertices.map(lanes));
+        // u·e₁ + v·e₂ − λ·d = s
+        let (e1, e2, s) = (Double::difference(b, a), Double::difference(c, a), Double::difference(o, a));
+        let (n, q) = (e1.cross(e2, plain), d.cross(s.hi));
+        let (nd, ns) = (n.times_float(d), n.times(s));
+        let [x, y, z] = Lanes::columns([nd.hi, ns.hi, q * e2.hi, q * e1.hi]);
+        let (xy, rounding) = two_sum(x, y);
+        let (forms, more_rounding) = two_sum(xy, z);
+        let [det, height, su, minus_sv] = forms.to_array();
+        let [lx, ly, lz] = nd.lo.rows(ns.lo);
+        let low = (rounding + more_rounding).low() + ((lx + ly) + lz);
+        let (sizes, m_d_s) = Sizes::new([d, s.hi, e1.hi, e2.hi]);
+        Self { det, height, su, sv: -minus_sv, low, present: forms.low().abs(), sizes, m_d_s }
+    }
+
+    /// Proved before λ is computed: neither D nor N has lost more than 18 of its bits.
+    #[inline(always)]
+    fn are_known(&self) -> bool {
+        let Self { present, m_d_s, ref sizes, .. } = *self;
+        let least = m_d_s * m_d_s.splat(sizes.m12);
+        let least = least + least.splat(TRIANGLE_CONDITION * PRESENT);
+        (present * present.splat(TRIANGLE_CONDITION)).is_between(least, TRIANGLE_CONDITION / PRESENT)
+    }
+
+    /// λ, its error and the weights; `inverse` is 1/D.
+    #[inline(always)]
+    fn hit(&self, inverse: f64) -> Hit {
+        let &Self { det, height, su, sv, low, .. } = self;
+        let first = -height * inverse;
+        let error = (U + TRIANGLE_LAMBDA) * first.abs();
+        let [det_lo, height_lo] = low.to_array();
+        let remainder = P::remainder(height, -first, det) + (height_lo + first * det_lo);
+        let lambda = first - remainder * inverse;
+        // Positive, and rounded above one at most.
+        Hit { lambda, error, uv: DVec2::new(su * inverse, sv * inverse).min(DVec2::ONE), part: 0 }
+    }
 }
 
 /// The largest components of e₁ and e₂, together and times each other, of s and of d.
@@ -200,7 +267,7 @@ impl Forms {
         let lanes = |v: DVec3| P::Lanes::of(cpu, v);
         let (o, d, [a, b, c]) = (lanes(ray.origin), lanes(ray.direction), vertices.map(lanes));
         let (e1, e2, s) = (Double::difference(b, a), Double::difference(c, a), Double::difference(o, a));
-        let (n, q) = (e1.cross(e2), s.crossed_by(d));
+        let (n, q) = (e1.cross(e2, false), s.crossed_by(d));
         let products = [n.times_float(d), q.times(e2), q.times(e1), n.times(s)];
         (Double::sums(products), Sizes::new([d, s.hi, e1.hi, e2.hi]).0)
     }
@@ -465,9 +532,11 @@ pub fn side(vertices: &[DVec3; 3], point: DVec3) -> Ordering {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bvh::Level;
     use crate::kernel::lanes::Plain;
     use crate::kernel::search::{Rational, climb, cross3, dot3, each, exact, minus};
     use crate::kernel::tally::Tally;
+    use fearless_simd::dispatch;
 
     /// From near and far, thin and plump, steep and grazing: vertices, and a ray at a point of their plane.
     pub(super) fn setting(x: &[f64]) -> (Ray, [DVec3; 3]) {
@@ -559,6 +628,43 @@ mod tests {
         let cold = Tally::now().since(before).refined;
         println!("triangle: {cold} of {cases} ordinary rays, {hits} hits");
         assert!(cold * 10_000 < cases && hits * 3 > cases);
+    }
+
+    /// What is known to be hit, and how: by the fast path with the same bits, or not at all.
+    #[test]
+    fn hits_known_beforehand_have_the_same_bits() {
+        let (mut fast, mut left, mut plain) = (0, 0, 0);
+        each(60_000, DIMENSION + 1, |x| {
+            let (mut ray, mut t) = setting(x);
+            if x[DIMENSION] > 0.0 {
+                let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
+                (ray.origin, t) = (5.0 * v(9), [v(0), v(3), v(6)]);
+                t = t.map(|v| if x[DIMENSION] > 0.7 { v.as_vec3().as_dvec3() } else { v / 3.0 });
+                ray.direction = t[0] + 0.5 * x[12].abs() * (t[1] - t[0]) + 0.5 * (t[2] - t[0]) - ray.origin;
+            }
+            let before = Tally::now();
+            let Some(hit) = intersect(&ray, &t, Interval::LINE) else { return };
+            let expected = (Tally::now() == before).then_some(hit);
+            let has_plain_edges = has_plain_edges(&t);
+            for (level, detected) in Level::all() {
+                let of = |plain| dispatch!(detected.token(), simd => passed(simd, &ray, &t, plain));
+                for plain in [false, has_plain_edges] {
+                    let (hit, found) = (expected, of(plain));
+                    if hit.is_some() {
+                        assert_eq!(found, hit, "{level}: {ray:?} {t:?}");
+                    } else if let Some(found) = found {
+                        // On an edge, for all that the fast path can tell.
+                        let hit = intersect(&ray, &t, Interval::LINE).unwrap();
+                        assert!((found.lambda - hit.lambda).abs() <= found.error + hit.error, "{level}: {ray:?} {t:?}");
+                    }
+                }
+            }
+            fast += usize::from(expected.is_some());
+            left += usize::from(expected.is_none());
+            plain += usize::from(has_plain_edges && expected.is_some());
+        });
+        println!("triangle: {fast} hits known beforehand, {plain} with plain edges; {left} left to the close path");
+        assert!(plain > 3000 && fast > plain + 3000 && left > 3000);
     }
 
     /// A ray through an edge or a vertex of a closed surface crosses an even number of triangles.

@@ -1,9 +1,10 @@
 //! The tree over a mesh's triangles, and its leaves.
 
-use super::leaf::{Leaf, ROTATION};
+use super::leaf::{Leaf, PLAIN, ROTATION};
 use crate::Aabb;
 use crate::bvh::{self, E, Frame, FrameBox, Level, Wide};
-use fearless_simd::{Simd, dispatch, f32x8, prelude::*, u32x8};
+use crate::kernel::float::power;
+use fearless_simd::{Simd, dispatch, f32x8, mask32x8, prelude::*, u32x8};
 use glam::{DVec3, Vec4};
 
 pub(super) struct Built {
@@ -111,8 +112,21 @@ fn of_points<S: Simd>(simd: S, points: &[Vec4], triangles: &[[u32; 3]], numbers:
     leaf.size = size.min(most).into();
     let id: u32x8<S> = leaf.id.simd_into(simd);
     let turned = |places: u32| u32x8::splat(simd, places << ROTATION);
-    leaf.id = (id | last.select(turned(2), middle.select(turned(1), turned(0)))).into();
+    let plain = is_short(simd, [a, b, c]).select(u32x8::splat(simd, PLAIN), u32x8::splat(simd, 0));
+    leaf.id = (id | plain | last.select(turned(2), middle.select(turned(1), turned(0)))).into();
     leaf
+}
+
+/// Whether all coordinates are multiples of 2⁻⁵², as those of f32 are that do not lie between 0 and 2⁻²⁹. They are at most 1, so
+/// that no difference needs more than the 53 bits of f64: it is exact, here and out of the frame.
+#[inline(always)]
+fn is_short<S: Simd>(simd: S, vertices: [[f32x8<S>; 3]; 3]) -> mask32x8<S> {
+    let (zero, least) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, power(-29) as f32));
+    let mut long = zero.simd_lt(zero);
+    for x in vertices.as_flattened() {
+        long |= x.abs().simd_lt(least) & x.abs().simd_gt(zero);
+    }
+    !long
 }
 
 /// The leaf of any triangles: edges are worked out in f64.
@@ -137,4 +151,41 @@ fn of_edges(frame: &Frame, positions: &[DVec3], triangles: &[[u32; 3]], numbers:
         leaf.id[lane] = number | (rotation as u32) << ROTATION;
     }
     leaf
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Mesh;
+    use crate::kernel::search::Random;
+    use crate::kernel::triangle::has_plain_edges;
+    use glam::DVec3;
+
+    /// From coordinates of all sizes, near the origin and far from it, and mirrored ones that ought to be zero.
+    #[test]
+    fn leaves_know_plain_edges() {
+        let mut random = Random::new(3);
+        let mut number = || f64::from(random.number() as f32);
+        let (mut plain, mut other) = (0, 0);
+        for (scale, center) in [(1.0, 0.0), (1e-3, 0.0), (1e30, 0.0), (1e-38, 0.0), (1.0, 4096.0)] {
+            let mut coordinate = || {
+                let fine = if number() > 0.9 { f64::powi(2.0, (30.0 * number()) as i32 - 30) } else { 1.0 };
+                f64::from((center + scale * fine * number()) as f32)
+            };
+            let positions: Vec<DVec3> =
+                (0..3000).map(|_| DVec3::new(coordinate(), coordinate(), coordinate())).collect();
+            let triangles = (0..1000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            let mesh = Mesh::new(positions, triangles).unwrap();
+            assert!(mesh.exact, "{scale} about {center}");
+            for leaf in &mesh.leaves {
+                for lane in (0..8).filter(|&lane| leaf.size[lane] >= 0.0) {
+                    let floats = has_plain_edges(&mesh.vertices(leaf.number(lane)));
+                    assert!(floats || !leaf.has_plain_edges(lane));
+                    plain += usize::from(leaf.has_plain_edges(lane));
+                    other += usize::from(!floats);
+                }
+            }
+        }
+        println!("{plain} triangles known to have plain edges, {other} that have not");
+        assert!(plain > 2000 && other > 300);
+    }
 }

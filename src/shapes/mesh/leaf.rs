@@ -12,7 +12,9 @@ use glam::DVec3;
 /// Triangles have 29 bits for their number.
 pub(super) const MOST_TRIANGLES: usize = 1 << 29;
 const NUMBER: u32 = (1 << 29) - 1;
-pub(super) const ROTATION: u32 = 29;
+/// Set where two edges, from the triangle's own first vertex, are vectors of floats.
+pub(super) const PLAIN: u32 = 1 << 29;
+pub(super) const ROTATION: u32 = 30;
 
 /// Up to eight triangles, with v₀ opposite the longest edge.
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +24,7 @@ pub(super) struct Leaf {
     pub(super) vertices: [[[f32; 8]; 3]; 3],
     /// Not below |e₁| + |e₂|; −1 in a lane that holds no triangle.
     pub(super) size: [f32; 8],
-    /// The triangle's number, and by how many places its vertices are rotated.
+    /// The triangle's number, [`PLAIN`], and by how many places its vertices are rotated.
     pub(super) id: [u32; 8],
 }
 
@@ -30,6 +32,11 @@ impl Leaf {
     #[inline(always)]
     pub(super) fn number(&self, lane: usize) -> u32 {
         self.id[lane] & NUMBER
+    }
+
+    #[inline(always)]
+    pub(super) fn has_plain_edges(&self, lane: usize) -> bool {
+        self.id[lane] & PLAIN != 0
     }
 
     /// The vertices, without a look at the mesh's own arrays where the copy is exact.

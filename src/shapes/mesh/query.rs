@@ -182,7 +182,7 @@ impl<'a> Nearest<'a> {
         if self.count == 1 && self.best.is_none() {
             // The rule.
             let Passed { leaf, lane, .. } = self.passed[0];
-            *hit = self.exactly(simd, leaf, lane);
+            *hit = self.passed(simd, leaf, lane);
             return;
         }
         if self.count > 0 {
@@ -229,6 +229,26 @@ impl<'a> Nearest<'a> {
         let vertices = leaf.vertices(lane as usize & 7, self.mesh);
         let hit = confirm(simd, self.ray, &vertices, self.within)?;
         Some(Hit { part: leaf.number(lane as usize & 7), ..hit })
+    }
+
+    /// The hit of a triangle that is certainly hit.
+    #[inline(always)]
+    fn passed<S: Simd>(&self, simd: S, leaf: u32, lane: u32) -> Option<Hit> {
+        let (number, leaf, lane) = (leaf, &self.mesh.leaves[leaf as usize], lane as usize & 7);
+        let vertices = leaf.vertices(lane, self.mesh);
+        match triangle::passed(simd, self.ray, &vertices, leaf.has_plain_edges(lane)) {
+            Some(hit) if !UNCERTIFIED => Some(Hit { part: leaf.number(lane), ..hit }),
+            _ => self.exactly_apart(simd, number, lane as u32),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn exactly_apart<S: Simd>(&self, simd: S, leaf: u32, lane: u32) -> Option<Hit> {
+        simd.vectorize(
+            #[inline(always)]
+            || self.exactly(simd, leaf, lane),
+        )
     }
 
     #[inline(never)]
