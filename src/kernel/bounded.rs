@@ -81,7 +81,8 @@ impl<P: Product> Number for Bounded<P> {
         let (hi, lo) = quick_two_sum(c, c_lo + (self.hi * other.lo + self.lo * other.hi));
         // Two floats have an exact product, unless it is so small that its rounding error is no float.
         let floats = (self.lo == 0.0) & (other.lo == 0.0) & (self.error == 0.0) & (other.error == 0.0);
-        let exact = floats & ((c.abs() > EXACT) | (self.hi == 0.0) | (other.hi == 0.0));
+        let zero = (self.hi == 0.0) & (self.error == 0.0) | (other.hi == 0.0) & (other.error == 0.0);
+        let exact = floats & (c.abs() > EXACT) | zero;
         let rounded = if exact { 0.0 } else { PRODUCT * hi.abs() + UNDERFLOW };
         let carried = self.magnitude() * other.error + other.magnitude() * self.error + self.error * other.error;
         Self { hi, lo, error: (carried + rounded) * INFLATE, by: PhantomData }

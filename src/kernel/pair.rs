@@ -45,6 +45,14 @@ impl Pair {
         sum + ((sum_lo + sums_lo) + products_lo + (mixed - lo * (2.0 * radius + lo)))
     }
 
+    /// |self|² − radius² as an unevaluated sum.
+    #[inline(always)]
+    pub(super) fn squared_less_pair<P: Product>(&self, radius: f64) -> (f64, f64) {
+        let Squares { s, t, sums_lo, products_lo, mixed } = self.squares::<P>(radius);
+        let (sum, sum_lo) = two_sum(s, t);
+        two_sum(sum, ((sum_lo + sums_lo) + products_lo) + mixed)
+    }
+
     /// |self|² − radius² where it nearly vanishes: the largest terms' sum is rounded like the result.
     #[inline(always)]
     pub(super) fn residual<P: Product>(&self, radius: f64) -> f64 {
@@ -72,14 +80,19 @@ impl Pair {
     /// self · v as an unevaluated sum.
     #[inline(always)]
     pub(super) fn dot_float<P: Product>(&self, v: DVec3) -> (f64, f64) {
-        let h = self.hi;
-        let (x, x_lo) = P::two_product(h.x, v.x);
-        let (y, y_lo) = P::two_product(h.y, v.y);
-        let (z, z_lo) = P::two_product(h.z, v.z);
-        let (s, s_lo) = two_sum(x, y);
-        let (t, t_lo) = two_sum(s, z);
-        (t, (s_lo + t_lo) + ((x_lo + y_lo) + z_lo) + plain_dot(self.lo, v))
+        let (sum, lo) = close_dot::<P>(self.hi, v);
+        (sum, lo + plain_dot(self.lo, v))
     }
+}
+
+/// a · b as an unevaluated sum.
+#[inline(always)]
+pub(super) fn close_dot<P: Product>(a: DVec3, b: DVec3) -> (f64, f64) {
+    let ((x, x_lo), (y, y_lo), (z, z_lo)) =
+        (P::two_product(a.x, b.x), P::two_product(a.y, b.y), P::two_product(a.z, b.z));
+    let (s, s_lo) = two_sum(x, y);
+    let (t, t_lo) = two_sum(s, z);
+    (t, (s_lo + t_lo) + ((x_lo + y_lo) + z_lo))
 }
 
 #[inline(always)]

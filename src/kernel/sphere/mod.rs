@@ -2,17 +2,20 @@
 //!
 //! With f = origin − center: A = |d|², b = f·d, D = r²A − |f × d|² (Lagrange's form of b² − AC, whose error grows with
 //! |f|, not with |f|²), λ = (−b ∓ √D)/A, then one Newton step with the residual |f + λd|² − r² in double-double, whose
-//! slope at the root is ∓2√D. docs/numerics.md §5 proves every constant.
+//! slope at the root is ∓2√D. Rays that start next to the sphere have a way of their own, `near.rs`. docs/numerics.md §5
+//! proves every constant.
 //!
 //! Close to Haines, Günther, Akenine-Möller 2019 (Ray Tracing Gems ch. 7) in the discriminant; the step, the bounds and
 //! the exact refinement are this crate's.
+
+mod near;
 
 use super::bound::U;
 use super::cpu;
 use super::eft::{Fused, Product, Split, quick_two_sum};
 use super::number::{Number, cross, difference, dot, vector};
 use super::pair::{Pair, plain_cross, plain_dot, taxicab};
-use super::section::{End, FINE, Quadratic, Undecided, fine, nearest, precise, refined, sign};
+use super::section::{End, Quadratic, Undecided, fine, nearest, precise, refined, sign};
 use super::tally;
 use crate::hit::Hit;
 use crate::interval::Interval;
@@ -28,10 +31,6 @@ const FIRST: f64 = 23.0;
 const SQUARED: f64 = 560.0;
 /// See [`SQUARED`].
 const RESIDUAL: f64 = 176.0 * U;
-/// |error of C from double-double| ≤ this·(r² + |C|).
-const NEAR_C: f64 = 64.0 * U * U;
-/// |error of b from double-double| ≤ u·|b| + this/4·(|f|₁ + r)·|d|₁.
-const NEAR_B: f64 = 128.0 * U * U;
 /// |f|₁ + r below this many radii keeps second-order terms within the constants.
 const FAR: f64 = (1u64 << 46) as f64;
 
@@ -64,40 +63,45 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
     if value < 0.0 {
         return None;
     }
+    let (a, b) = (plain_dot(d, d), plain_dot(f.hi, d));
+    // The root behind the origin, next to it, of a ray that starts inside.
+    let mut entered = false;
+    // b² − D = A·C
+    if (b * b - value).abs() <= near::NEXT * (a * r * r) {
+        if !((within.min >= 0.0) & near::is_behind(f.hi, d, b, r)) {
+            return near::intersect(ray, center.x, center.y, center.z, r, within.min, within.max);
+        }
+        if b > 0.0 {
+            return None;
+        }
+        entered = true;
+    }
     let root = value.sqrt();
     // One over A while the root is taken.
-    let (inverse, b) = (1.0 / plain_dot(d, d), plain_dot(f.hi, d));
+    let inverse = 1.0 / a;
     let (z, rest) = bounds(f.hi, d, r, root);
     // The root at which the polynomial falls (it is entered), then the one at which it rises.
     for slope in [-1.0, 1.0] {
         let first = (slope * root - b) * inverse;
-        if first + FIRST * z <= within.min {
+        if (first + FIRST * z <= within.min) | entered {
+            entered = false;
             continue;
         }
-        // `rest` is far above `FIRST`·u·z: then λ is `first` to within a part of it, and known.
-        if rest <= 0.4 * U * first.abs() {
-            let (lambda, lo) = step::<P>(&f, d, r, root, slope, first);
-            let error = (lo.abs() + rest) * (1.0 + 8.0 * U);
-            if (lambda - error > within.min) & (lambda + error < within.max) {
-                return Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 });
-            }
-            if lambda + error < within.min {
-                continue;
-            }
-            if lambda - error > within.max {
-                return None;
-            }
+        // `rest` is far above `FIRST`·u·z: then λ is `first` to within a part of it, and known. Not where the ray grazes.
+        let known = rest <= 0.4 * U * first.abs();
+        if !known {
             return cold();
         }
-        // The ray starts next to the sphere, or grazes it.
-        let root_error = error * (1.0 / root);
-        let root = slope * root;
-        let (lambda, error) = next_to_origin(ray, center.x, center.y, center.z, r, root, root_error, within.min >= 0.0);
+        let (lambda, lo) = step::<P>(&f, d, r, root, slope, first);
+        let error = (lo.abs() + rest) * (1.0 + 8.0 * U);
+        if (lambda - error > within.min) & (lambda + error < within.max) {
+            return Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 });
+        }
         if lambda + error < within.min {
             continue;
         }
-        if (lambda - error > within.min) & (lambda + error < within.max) {
-            return Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 });
+        if lambda - error > within.max {
+            return None;
         }
         return cold();
     }
@@ -134,55 +138,6 @@ fn step<P: Product>(f: &Pair, d: DVec3, r: f64, root: f64, slope: f64, first: f6
     quick_two_sum(first, -slope * 0.5 * (1.0 / root) * residual)
 }
 
-/// λ and its error of a root next to the origin, as on a ray that starts on the sphere: C/(|b| + √D) with C in
-/// double-double, and b too if it must be. `root` is ∓√D, off by `root_error`. NaN where λ is not so small, or not known
-/// to a part of the least ulp that is promised; −∞ where it is below zero and nobody asks further, which is `FORWARD`.
-#[inline(never)]
-#[expect(clippy::too_many_arguments, reason = "scalars stay in registers")]
-fn next_to_origin(ray: &Ray, x: f64, y: f64, z: f64, r: f64, root: f64, root_error: f64, forward: bool) -> (f64, f64) {
-    let center = DVec3::new(x, y, z);
-    cpu::dispatch(
-        #[inline(always)]
-        move || small_root::<Fused>(ray, center, r, root, root_error, forward),
-        #[inline(always)]
-        move || small_root::<Split>(ray, center, r, root, root_error, forward),
-    )
-}
-
-#[inline(always)]
-fn small_root<P: Product>(ray: &Ray, center: DVec3, r: f64, root: f64, root_error: f64, forward: bool) -> (f64, f64) {
-    let (f, d) = (Pair::difference(ray.origin, center), ray.direction);
-    let (size, d1) = (r + taxicab(f.hi), taxicab(d));
-    let c = f.squared_less::<P>(r, 0.0);
-    let c_error = NEAR_C * (r * r + c.abs());
-    // On the sphere b and √D will do as they are: how far off they may be, together, against their sum.
-    let b = plain_dot(f.hi, d);
-    let (sum, off) = (b.abs() + root.abs(), 4.0 * U * size * d1 + root_error);
-    let near = (root * b > 0.0) & (off < 0.125 * sum);
-    if near & forward & (c * root.signum() > c_error) {
-        return (f64::NEG_INFINITY, 0.0);
-    }
-    let over = 1.0 / sum;
-    let lambda = -c * over * root.signum();
-    let error = c_error * over + lambda.abs() * (1.25 * off * over + 8.0 * U);
-    // Mostly the radius is large enough.
-    if near & (error * (1.75 * d1) <= 0.5 * U * FINE * r) {
-        return (lambda, error);
-    }
-    let least = 0.5 * U * fine(ray, center.abs().max_element().max(r));
-    if near & (error <= least) {
-        return (lambda, error);
-    }
-    let a = plain_dot(d, d);
-    let (b, b_lo) = f.dot_float::<P>(d);
-    let b = b + b_lo;
-    let over = 1.0 / (b.abs() + (b * b - a * c).sqrt());
-    let lambda = -c * over * root.signum();
-    let error = NEAR_C * (r * r + c.abs()) * over + lambda.abs() * (16.0 * U + NEAR_B * size * d1 * over);
-    let near = (root * b > 0.0) & (4.0 * a * c.abs() < b * b);
-    if near & (error <= least) { (lambda, error) } else { (f64::NAN, f64::NAN) }
-}
-
 /// Scalars, so that the caller's vectors stay in registers.
 #[cold]
 #[inline(never)]
@@ -214,34 +169,31 @@ fn accepts(ray: &Ray, center: DVec3, radius: f64) -> bool {
     ray.is_valid() && center.is_finite() && radius > 0.0 && radius.is_finite()
 }
 
-/// |f + λd|² − r² with f = origin − center. By Lagrange's identity its discriminant is |d|²r² − |f × d|², which does
-/// not cancel as b² − ac does from afar.
+/// |f + λd|² − r² with f = origin − center, if it has roots. By Lagrange's identity its discriminant is |d|²r² − |f × d|²,
+/// which does not cancel as b² − ac does from afar.
 #[inline(always)]
-fn quadratic<N: Number>(ray: &Ray, center: DVec3, radius: f64) -> Quadratic<N> {
+fn quadratic<N: Number>(ray: &Ray, center: DVec3, radius: f64) -> Result<Option<Quadratic<N>>, Undecided> {
     let (f, d) = (difference::<N>(ray.origin, center), vector::<N>(ray.direction));
     let r2 = N::exactly(radius).squared();
     let w = cross(&f, &d);
     let a = dot(&d, &d);
     let discriminant = a.times(&r2).minus(&dot(&w, &w));
-    Quadratic { b: dot(&f, &d), c: dot(&f, &f).minus(&r2), a, discriminant }
+    if sign(&discriminant)?.is_lt() {
+        return Ok(None);
+    }
+    Ok(Some(Quadratic { b: dot(&f, &d), c: dot(&f, &f).minus(&r2), a, discriminant }))
 }
 
 #[inline(always)]
 fn decide<N: Number>(ray: &Ray, center: DVec3, radius: f64, within: Interval) -> Result<Option<Hit>, Undecided> {
-    let q = quadratic::<N>(ray, center, radius);
-    if sign(&q.discriminant)?.is_lt() {
-        return Ok(None);
-    }
+    let Some(q) = quadratic::<N>(ray, center, radius)? else { return Ok(None) };
     let fine = fine(ray, center.abs().max_element().max(radius));
     nearest([(End::Falling(&q), 0), (End::Rising(&q), 0)], within, fine)
 }
 
 #[inline(always)]
 fn sharpen<N: Number>(ray: &Ray, center: DVec3, radius: f64, lambda: f64) -> Result<[f64; 2], Undecided> {
-    let q = quadratic::<N>(ray, center, radius);
-    if sign(&q.discriminant)?.is_lt() {
-        return Ok([lambda, 0.0]);
-    }
+    let Some(q) = quadratic::<N>(ray, center, radius)? else { return Ok([lambda, 0.0]) };
     precise(&[End::Falling(&q), End::Rising(&q)], lambda)
 }
 
