@@ -219,11 +219,52 @@ impl Map {
             || self.image_with::<Split>(ray),
         );
         // Where the terms cancel by more than a far-off place explains, two floats may not hold enough of their sum.
-        let size = |v: DVec3| v.abs().max_element();
-        let (o, d) = (size(image.ray.origin), size(image.ray.direction));
-        let shifts_lambda = image.origin_error * size(ray.direction) > ENOUGH * ENOUGH * U * size(ray.origin) * d;
-        let poor = image.direction_error > ENOUGH * U * d || image.origin_error > ENOUGH * U * o && shifts_lambda;
-        if poor && ray.is_valid() { self.exact_image(ray).unwrap_or(image) } else { image }
+        let poor = !image.knows(image.direction_error, image.origin_error, [0.0; 2], ray);
+        if poor && ray.is_valid() { self.close_image(ray, image) } else { image }
+    }
+
+    /// In three floats a sum, which nearly always do; else exactly.
+    #[cold]
+    #[inline(never)]
+    fn close_image(&self, ray: &Ray, image: Image) -> Image {
+        tally::refined();
+        let unknown = self.rest.as_ref().map_or([0.0; 2], |rest| rest.unknown(ray));
+        let close = cpu::dispatch(
+            #[inline(always)]
+            || self.close_image_with::<Fused>(ray, unknown),
+            #[inline(always)]
+            || self.close_image_with::<Split>(ray, unknown),
+        );
+        // Nobody can know more than the chain's entries do.
+        let [origin, direction] = [close.origin_error - unknown[0], close.direction_error - unknown[1]];
+        if close.knows(direction, origin, unknown, ray) { close } else { self.exact_image(ray).unwrap_or(image) }
+    }
+
+    #[inline(always)]
+    fn close_image_with<P: Product>(&self, ray: &Ray, unknown: [f64; 2]) -> Image {
+        let (o, d, t) = (ray.origin, ray.direction, self.leading.translation);
+        let low = self.rest.as_ref().map_or(DAffine3::ZERO, |rest| rest.low);
+        let t_low = low.translation;
+        Image::new(
+            [
+                self.close_row::<P>(0, o, t.x, &low.matrix3, t_low.x),
+                self.close_row::<P>(1, o, t.y, &low.matrix3, t_low.y),
+                self.close_row::<P>(2, o, t.z, &low.matrix3, t_low.z),
+            ],
+            [
+                self.close_row::<P>(0, d, 0.0, &low.matrix3, 0.0),
+                self.close_row::<P>(1, d, 0.0, &low.matrix3, 0.0),
+                self.close_row::<P>(2, d, 0.0, &low.matrix3, 0.0),
+            ],
+            unknown,
+        )
+    }
+
+    #[inline(always)]
+    fn close_row<P: Product>(&self, i: usize, v: DVec3, t: f64, low: &DMat3, t_low: f64) -> (f64, f64, f64) {
+        let m = &self.leading.matrix3;
+        let rows = ([m.x_axis[i], m.y_axis[i], m.z_axis[i]], [low.x_axis[i], low.y_axis[i], low.z_axis[i]]);
+        close_sum::<P>(rows, v, t, t_low)
     }
 
     /// No closures: what is not inlined would be compiled without the instructions that `P` needs.
@@ -322,6 +363,18 @@ pub struct Image {
 }
 
 impl Image {
+    /// Whether these errors are too small to count: beside the last places, or, of the origin, beside λ's; or beside what is
+    /// unknown anyway. A NaN is not.
+    #[inline(always)]
+    fn knows(&self, direction_error: f64, origin_error: f64, unknown: [f64; 2], ray: &Ray) -> bool {
+        let size = |v: DVec3| v.abs().max_element();
+        let (o, d) = (size(self.ray.origin), size(self.ray.direction));
+        let along = direction_error <= (ENOUGH * U * d).max(unknown[1]);
+        along
+            && (origin_error <= (ENOUGH * U * o).max(unknown[0])
+                || origin_error * size(ray.direction) <= ENOUGH * ENOUGH * U * size(ray.origin) * d)
+    }
+
     #[inline(always)]
     fn new(o: [(f64, f64, f64); 3], d: [(f64, f64, f64); 3], unknown: [f64; 2]) -> Self {
         // Products and their errors may have underflowed.
@@ -351,6 +404,38 @@ pub(crate) fn sum<P: Product>(r: [f64; 3], v: DVec3, t: f64, low: f64) -> (f64, 
     let size = (x.abs() + y.abs()) + (z.abs() + t.abs());
     (hi, lo, 40.0 * U * U * size)
 }
+
+/// (r + r_low)·v + t + `t_low` in double-double, summed in three floats, and a bound on its error: docs/numerics.md §8.
+#[inline(always)]
+fn close_sum<P: Product>((r, r_low): ([f64; 3], [f64; 3]), v: DVec3, t: f64, t_low: f64) -> (f64, f64, f64) {
+    let (x, x_lo) = P::two_product(r[0], v.x);
+    let (y, y_lo) = P::two_product(r[1], v.y);
+    let (z, z_lo) = P::two_product(r[2], v.z);
+    let (xy, e) = two_sum(x, y);
+    let (zt, f) = two_sum(z, t);
+    let (first, g) = two_sum(xy, zt);
+    // What is of the size of the first one's rounding.
+    let (p, p_lo) = P::two_product(r_low[0], v.x);
+    let (q, q_lo) = P::two_product(r_low[1], v.y);
+    let (s, s_lo) = P::two_product(r_low[2], v.z);
+    let (ef, a) = two_sum(e, f);
+    let (g, b) = two_sum(g, t_low);
+    let (lows, c) = two_sum(x_lo, y_lo);
+    let (lows, d) = two_sum(lows, z_lo);
+    let (pq, h) = two_sum(p, q);
+    let (sum, i) = two_sum(pq, s);
+    let (left, j) = two_sum(ef, g);
+    let (right, k) = two_sum(lows, sum);
+    let (second, l) = two_sum(left, right);
+    let third = (((a + b) + (c + d)) + ((h + i) + (j + k))) + (l + ((p_lo + q_lo) + s_lo));
+    let (hi, rest) = two_sum(first, second);
+    let (hi, lo) = two_sum(hi, rest + third);
+    let size = (x.abs() + y.abs()) + (z.abs() + t.abs());
+    (hi, lo, 2.0 * U * U * hi.abs() + CLOSE_SUM * size)
+}
+
+/// |error of [`close_sum`] beyond its low float's rounding| ≤ this times the sum of the products' absolute values.
+const CLOSE_SUM: f64 = 256.0 * U * U * U;
 
 /// |v|₁ ≥ |v|.
 #[inline(always)]
@@ -382,6 +467,9 @@ mod tests {
             let ray = ray(&x[24..]);
             let (split, fused) = (chain.image_with::<Split>(&ray), chain.image_with::<Fused>(&ray));
             prop_assert_eq!(format!("{split:?}"), format!("{fused:?}"));
+            let [split, fused] =
+                [chain.close_image_with::<Split>(&ray, [0.0; 2]), chain.close_image_with::<Fused>(&ray, [0.0; 2])];
+            prop_assert_eq!(format!("{split:?}"), format!("{fused:?}"));
         }
 
         #[test]
@@ -394,7 +482,10 @@ mod tests {
                 let turned = dot(&m.0[i], v);
                 if moved { turned.plus(&m.1[i]) } else { turned }
             });
-            for image in [chain.image_with::<Split>(&ray), chain.exact_image(&ray).unwrap()] {
+            let unknown = chain.rest.as_ref().unwrap().unknown(&ray);
+            let images =
+                [chain.image_with::<Split>(&ray), chain.close_image_with::<Split>(&ray, unknown), chain.exact_image(&ray).unwrap()];
+            for image in images {
                 let parts = [
                     (true, ray.origin, image.ray.origin, image.origin_low, image.origin_error),
                     (false, ray.direction, image.ray.direction, image.direction_low, image.direction_error),
@@ -408,6 +499,24 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn no_input_reaches_the_bound_of_close_sums() {
+        use crate::kernel::search::{Rational, climb, dot3, exact};
+        let worst = climb("map: sums in three floats", 11, |x| {
+            let (mut r, v, t) = ([x[0], x[1], x[2]], DVec3::new(x[3], x[4], x[5]), x[6]);
+            // The product left over cancels the others, to about the last place.
+            r[2] = -(r[0] * v.x + r[1] * v.y + t) / v.z;
+            let low = [0, 1, 2].map(|i| U * x[7 + i] * r[i]);
+            let t_low = U * x[10] * t;
+            let (hi, lo, error) = close_sum::<Split>((r, low), v, t, t_low);
+            let number = |x: f64| Rational::try_from(x).ok();
+            let exact =
+                dot3(&exact(r.into()), &exact(v)) + dot3(&exact(low.into()), &exact(v)) + number(t)? + number(t_low)?;
+            Some(((exact - number(hi)? - number(lo)?).to_f64().value() / error).abs())
+        });
+        assert!((0.001..1.0).contains(&worst));
     }
 
     /// Rotations, scalings, shears and moves with their zeros, and such as are almost singular.
