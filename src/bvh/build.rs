@@ -82,7 +82,8 @@ impl Box8 {
     #[inline(always)]
     fn half_area(&self) -> f32 {
         let [x, y, z, _, u, v, w, _] = self.0;
-        area_of_sides([x + u, y + v, z + w])
+        let (x, y, z) = (x + u, y + v, z + w);
+        x * y + y * z + z * x
     }
 
     /// Twice the centre's coordinate.
@@ -97,17 +98,11 @@ impl Box8 {
     }
 }
 
-/// Half the surface of a [`Box8`] in a register.
+/// The sides of a [`Box8`] in a register.
 #[inline(always)]
-pub(super) fn half_area_of<S: Simd>(b: f32x8<S>) -> f32 {
+pub(super) fn sides<S: Simd>(b: f32x8<S>) -> f32x4<S> {
     let (least, most) = b.split();
-    let [x, y, z, _]: [f32; 4] = (least + most).into();
-    area_of_sides([x, y, z])
-}
-
-#[inline(always)]
-fn area_of_sides([x, y, z]: [f32; 3]) -> f32 {
-    x * y + y * z + z * x
+    least + most
 }
 
 /// The binary tree; `nodes[0]` is the root, slot 1 is vacant and others may be, and siblings lie in pairs from slot 2 on,
@@ -137,31 +132,39 @@ impl Binary {
         assert!(count < 1 << COUNT, "{count} objects are too many for one tree");
         let run = if leaf > 1 { LONGEST_RUN } else { 1 };
         watch.phase(0.2, count);
+        let level = Level::detect();
+        let around = |items: &[Item]| dispatch!(level.token(), simd => Box8::around(simd, items));
         let chunks = tasks::map(count.div_ceil(CHUNK), |chunk| {
             watch.add(CHUNK);
-            runs(chunk * CHUNK..count.min((chunk + 1) * CHUNK), bounds, run)
+            let items = runs(chunk * CHUNK..count.min((chunk + 1) * CHUNK), bounds, run);
+            let all = around(&items);
+            (items, all)
         });
-        let mut items = chunks.concat();
+        let mut items = Vec::with_capacity(chunks.iter().map(|(items, _)| items.len()).sum());
+        let mut all = Box8::EMPTY;
+        for (chunk, b) in chunks {
+            items.extend_from_slice(&chunk);
+            all = Box8(std::array::from_fn(|i| all.0[i].min(b.0[i])));
+        }
         // Those of infinite size last.
-        let infinite = |i: &Item| i.0.half_area() == f32::INFINITY;
-        let finite = items.len() - items.iter().filter(|i| infinite(i)).count();
-        if finite < items.len() {
+        let mut finite = items.len();
+        if all.half_area() == f32::INFINITY {
+            let infinite = |i: &Item| i.0.half_area() == f32::INFINITY;
+            finite -= items.iter().filter(|i| infinite(i)).count();
             items.sort_by_key(infinite);
         }
         let mut nodes = vec![Node::VACANT; 2 * items.len()];
         watch.phase(0.6, items.len());
         if !items.is_empty() {
             let (root, slots) = nodes.split_at_mut(2);
-            let builder = Builder { level: Level::detect(), leaf, unit: unit(leaf), watch };
-            let around = |items: &[Item]| dispatch!(builder.level.token(), simd => Box8::around(simd, items));
+            let builder = Builder { level, leaf, unit: unit(leaf), watch };
             let at = Place { item: 0, slot: 2, depth: 0 };
             root[0] = if 0 < finite && finite < items.len() {
                 let (left, right) = items.split_at(finite);
                 let (left, right) = (around(left), around(right));
                 builder.inner(&mut items, slots, right, at, &Split { mid: finite, left, right })
             } else {
-                let bounds = around(&items);
-                builder.subdivide(&mut items, slots, bounds, at)
+                builder.subdivide(&mut items, slots, all, at)
             };
         }
         Self { frame, items, nodes }

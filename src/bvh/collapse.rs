@@ -104,16 +104,22 @@ impl Plan {
             choices = 1 << (3 * 2) | 1 << (3 * 8);
             costs = [l[0] + r[0]; 9];
         } else {
-            for lanes in 2..=8usize {
-                let mut best = (f32::INFINITY, 0);
-                for k in 1..lanes {
-                    let c = l[k - 1] + r[lanes - k - 1];
-                    if c < best.0 {
-                        best = (c, k);
-                    }
+            // All numbers of lanes beside each other, each with k of them for the left child.
+            let mut padded = [f32::INFINITY; 16];
+            padded[8..15].copy_from_slice(&r);
+            let (mut best, mut of_left) = ([f32::INFINITY; 8], [0u32; 8]);
+            for k in 1..8 {
+                let right = &padded[8 - k..16 - k];
+                for lane in 0..8 {
+                    let cost = l[k - 1] + right[lane];
+                    let less = cost < best[lane];
+                    best[lane] = if less { cost } else { best[lane] };
+                    of_left[lane] = if less { k as u32 } else { of_left[lane] };
                 }
-                costs[lanes] = best.0;
-                choices |= (best.1 as u32) << (3 * lanes);
+            }
+            for lanes in 2..=8 {
+                costs[lanes] = best[lanes - 1];
+                choices |= of_left[lanes - 1] << (3 * lanes);
             }
         }
         let inner = costs[8] + area;

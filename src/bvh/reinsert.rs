@@ -13,7 +13,7 @@ use super::watch::Watch;
 use std::collections::BinaryHeap;
 
 /// In each pass one node in so many looks around; more do where the first ones have found something.
-const SHARES: [usize; 3] = [20, 10, 10];
+const SHARES: [usize; 4] = [20, 10, 10, 10];
 const STEPS: usize = 64;
 /// The last pass is one in which no more than one node in so many has found a better place.
 const CONTENT: usize = 32;

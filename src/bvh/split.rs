@@ -1,7 +1,7 @@
 //! Where a set of boxes is split in two: surface area heuristic over bins (Wald 2007).
 
-use super::build::{Box8, Item, half_area_of};
-use fearless_simd::{Simd, f32x4, prelude::*};
+use super::build::{Box8, Item, sides};
+use fearless_simd::{Simd, f32x4, f32x8, i32x4, prelude::*};
 
 /// Below this depth items are halved by number, which ends within 32 more levels.
 pub(super) const DEEPEST_SAH: u32 = 64;
@@ -41,20 +41,54 @@ impl<S: Simd, const BINS: usize> Binning<S, BINS> {
     }
 }
 
-/// What the bins hold, by axis.
+/// What the bins hold: boxes by axis, counts of all axes beside each other, as far apart as boxes.
 struct Bins<const BINS: usize> {
     bounds: [[Box8; BINS]; 3],
-    counts: [[u32; BINS]; 3],
+    counts: [[i32; 8]; BINS],
 }
 
 impl<const BINS: usize> Bins<BINS> {
     #[inline(always)]
     fn put<S: Simd>(&mut self, binning: &Binning<S, BINS>, item: &Item) {
-        let count = item.count();
+        let count = item.count() as i32;
         for (axis, bin) in binning.bins(item).into_iter().enumerate() {
-            self.counts[axis][bin] += count;
+            self.counts[bin][axis] += count;
             self.bounds[axis][bin].grow(binning.simd, &item.0);
         }
+    }
+}
+
+/// One part of a split, of the axes beside each other.
+struct Side<S: Simd> {
+    simd: S,
+    bounds: [f32x8<S>; 3],
+    count: i32x4<S>,
+}
+
+impl<S: Simd> Side<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        let empty = Box8::EMPTY.load(simd);
+        Self { simd, bounds: [empty, empty, empty], count: i32x4::splat(simd, 0) }
+    }
+
+    #[inline(always)]
+    fn take<const BINS: usize>(&mut self, bounds: &[[Box8; BINS]; 3], counts: &[[i32; 8]; BINS], bin: usize) {
+        for (b, bins) in self.bounds.iter_mut().zip(bounds) {
+            *b = b.min(bins[bin].load(self.simd));
+        }
+        self.count += i32x4::from_slice(self.simd, &counts[bin][..4]);
+    }
+
+    /// Area times leaves.
+    #[inline(always)]
+    fn cost(&self, leaf: u32) -> f32x4<S> {
+        let [a, b, c] = [sides(self.bounds[0]), sides(self.bounds[1]), sides(self.bounds[2])];
+        let (ac, b_) = (a.interleave(c), b.interleave(b));
+        let (x, y, z) = (ac.0.zip_low(b_.0), ac.0.zip_high(b_.0), ac.1.zip_low(b_.1));
+        let area = x * y + y * z + z * x;
+        let leaves = (self.count + i32x4::splat(self.simd, (1 << leaf) - 1)) >> leaf;
+        area * f32x4::float_from(leaves)
     }
 }
 
@@ -87,7 +121,7 @@ fn split_in_bins<S: Simd, const BINS: usize>(simd: S, items: &mut [Item], depth:
         return halve(simd, items);
     }
     let binning = Binning::<S, BINS> { simd, least, scale: scale.simd_into(simd) };
-    let mut bins = Bins { bounds: [[Box8::EMPTY; BINS]; 3], counts: [[0; BINS]; 3] };
+    let mut bins = Bins { bounds: [[Box8::EMPTY; BINS]; 3], counts: [[0; 8]; BINS] };
     // From two places in turn: neighbours share a bin, and would wait for each other.
     let (first, second) = items.split_at(items.len() / 2);
     for (a, b) in first.iter().zip(second) {
@@ -98,32 +132,29 @@ fn split_in_bins<S: Simd, const BINS: usize>(simd: S, items: &mut [Item], depth:
         bins.put(&binning, &second[second.len() - 1]);
     }
     let Bins { bounds, counts } = &bins;
-    let leaves = |count: u32| ((count + (1 << leaf) - 1) >> leaf) as f32;
-    // The axes beside each other, so that none waits for its own areas.
-    let mut costs = [[0.0f32; BINS]; 3];
-    let (mut b, mut count) = ([Box8::EMPTY.load(simd); 3], [0; 3]);
+    let mut above = Side::new(simd);
+    let mut costs = [[0.0f32; 4]; BINS];
     for i in (1..BINS).rev() {
-        for axis in 0..3 {
-            b[axis] = b[axis].min(bounds[axis][i].load(simd));
-            count[axis] += counts[axis][i];
-            costs[axis][i] = half_area_of(b[axis]) * leaves(count[axis]);
-        }
+        above.take(bounds, counts, i);
+        costs[i] = above.cost(leaf).into();
     }
-    let (mut b, mut count) = ([Box8::EMPTY.load(simd); 3], [0; 3]);
-    for i in 1..BINS {
-        for axis in 0..3 {
-            b[axis] = b[axis].min(bounds[axis][i - 1].load(simd));
-            count[axis] += counts[axis][i - 1];
-            costs[axis][i] += half_area_of(b[axis]) * leaves(count[axis]);
-        }
+    let mut below = Side::new(simd);
+    let mut least_cost = f32x4::splat(simd, f32::INFINITY);
+    let mut boundaries = f32x4::splat(simd, 0.0);
+    for (i, &cost) in costs.iter().enumerate().skip(1) {
+        below.take(bounds, counts, i - 1);
+        let cost: f32x4<S> = cost.simd_into(simd);
+        let cost = below.cost(leaf) + cost;
+        // The first bin and the last are never empty. Infinite boxes cost infinitely much everywhere.
+        let less = cost.simd_lt(least_cost);
+        boundaries = less.select(f32x4::splat(simd, i as f32), boundaries);
+        least_cost = less.select(cost, least_cost);
     }
+    let (least_cost, boundaries): ([f32; 4], [f32; 4]) = (least_cost.into(), boundaries.into());
     let mut best = (f32::INFINITY, 0, 0);
     for axis in (0..3).filter(|&axis| scale[axis] != 0.0) {
-        for (i, &cost) in costs[axis].iter().enumerate().skip(1) {
-            // The first bin and the last are never empty. Infinite boxes cost infinitely much everywhere.
-            if cost < best.0 {
-                best = (cost, axis, i);
-            }
+        if least_cost[axis] < best.0 {
+            best = (least_cost[axis], axis, boundaries[axis] as usize);
         }
     }
     let (_, axis, boundary) = best;

@@ -26,7 +26,7 @@ pub(super) fn build(
 ) -> Option<Built> {
     let bounds = positions.iter().zip(used).filter(|(_, used)| **used).fold(Aabb::EMPTY, |b, (&p, _)| grown(b, p));
     let frame = Frame::around(bounds);
-    let mut points = bvh::map(positions.len(), |i| {
+    let points = bvh::map(positions.len(), |i| {
         let point = frame.nearest(positions[i]);
         // The fourth coordinate says whether it is another point.
         let changed = frame.world(point.truncate().as_dvec3()) != positions[i];
@@ -46,10 +46,7 @@ pub(super) fn build(
         if wide { b.widened() } else { b }
     };
     let built = bvh::build(triangles.len(), frame, &boxes, 8, watch)?;
-    if !exact {
-        // Edges are not formed from rounded vertices.
-        points = Vec::new();
-    }
+    let corners = Corners { frame, positions, points: &points, triangles, exact };
     let count = built.starts.len() - 1;
     watch.phase(1.0, count);
     let leaves = bvh::map(count, |i| {
@@ -57,11 +54,7 @@ pub(super) fn build(
         if i % 1024 == 1023 {
             watch.add(1024);
         }
-        if exact {
-            dispatch!(level.token(), simd => of_points(simd, &points, triangles, numbers))
-        } else {
-            of_edges(&frame, positions, triangles, numbers)
-        }
+        dispatch!(level.token(), simd => corners.leaf(simd, numbers))
     });
     watch.add(count);
     (!watch.stopped()).then_some(Built { tree: built.tree, leaves, exact, bounds })
@@ -73,48 +66,76 @@ fn grown(b: Aabb, p: DVec3) -> Aabb {
 
 const EMPTY: Leaf = Leaf { vertices: [[[0.0; 8]; 3]; 3], size: [-1.0; 8], id: [0; 8] };
 
-/// The leaf of triangles whose vertices in the frame are floats.
-#[inline(always)]
-fn of_points<S: Simd>(simd: S, points: &[Vec4], triangles: &[[u32; 3]], numbers: &[u32]) -> Leaf {
-    let mut leaf = EMPTY;
-    // No triangle's size is more, or less.
-    let mut most = [-1.0; 8];
-    for (lane, &number) in numbers.iter().enumerate().take(8) {
-        for (rows, v) in leaf.vertices.iter_mut().zip(triangles[number as usize]) {
-            let [x, y, z, _] = points[v as usize].to_array();
-            (rows[0][lane], rows[1][lane], rows[2][lane]) = (x, y, z);
+/// What leaves are made of. `points` are the positions in the frame.
+struct Corners<'a> {
+    frame: Frame,
+    positions: &'a [DVec3],
+    points: &'a [Vec4],
+    triangles: &'a [[u32; 3]],
+    exact: bool,
+}
+
+impl Corners<'_> {
+    #[inline(always)]
+    fn leaf<S: Simd>(&self, simd: S, numbers: &[u32]) -> Leaf {
+        let mut leaf = EMPTY;
+        // No triangle's size is more, or less.
+        let mut most = [-1.0; 8];
+        for (lane, &number) in numbers.iter().enumerate().take(8) {
+            for (rows, v) in leaf.vertices.iter_mut().zip(self.triangles[number as usize]) {
+                let [x, y, z, _] = self.points[v as usize].to_array();
+                (rows[0][lane], rows[1][lane], rows[2][lane]) = (x, y, z);
+            }
+            leaf.id[lane] = number;
+            most[lane] = f32::INFINITY;
         }
-        leaf.id[lane] = number;
-        most[lane] = f32::INFINITY;
+        let [a, b, c] = [load(simd, &leaf.vertices[0]), load(simd, &leaf.vertices[1]), load(simd, &leaf.vertices[2])];
+        let (of_a, of_b, of_c) = (square(minus(c, b)), square(minus(a, c)), square(minus(b, a)));
+        // Which vertex comes first: b, c, or else a.
+        let last = of_c.simd_gt(of_a.max(of_b));
+        let middle = of_b.simd_gt(of_a) & !last;
+        let pick = |p: f32x8<S>, q: f32x8<S>, r: f32x8<S>| last.select(r, middle.select(q, p));
+        for i in 0..3 {
+            leaf.vertices[0][i] = pick(a[i], b[i], c[i]).into();
+            leaf.vertices[1][i] = pick(b[i], c[i], a[i]).into();
+            leaf.vertices[2][i] = pick(c[i], a[i], b[i]).into();
+        }
+        let turned = |places: u32| u32x8::splat(simd, places << ROTATION);
+        let id: u32x8<S> = leaf.id.simd_into(simd);
+        leaf.id = (id | last.select(turned(2), middle.select(turned(1), turned(0)))).into();
+        let lengths = if self.exact {
+            let id: u32x8<S> = leaf.id.simd_into(simd);
+            leaf.id = (id | is_short(simd, [a, b, c]).select(u32x8::splat(simd, PLAIN), turned(0))).into();
+            pick(of_b, of_c, of_a).sqrt() + pick(of_c, of_a, of_b).sqrt()
+        } else {
+            self.edges(&mut leaf, numbers);
+            square(load(simd, &leaf.vertices[1])).sqrt() + square(load(simd, &leaf.vertices[2])).sqrt()
+        };
+        // Differences, squares, sums, roots, the last sum and these two: less than 8 roundings; and squares that underflow.
+        let size = lengths * f32x8::splat(simd, 1.0 + 16.0 * E) + f32x8::splat(simd, 2e-22);
+        let most: f32x8<S> = most.simd_into(simd);
+        leaf.size = size.min(most).into();
+        leaf
     }
-    let load = |rows: &[[f32; 8]; 3]| -> [f32x8<S>; 3] {
-        [rows[0].simd_into(simd), rows[1].simd_into(simd), rows[2].simd_into(simd)]
-    };
-    let [a, b, c] = [load(&leaf.vertices[0]), load(&leaf.vertices[1]), load(&leaf.vertices[2])];
-    let square = |p: [f32x8<S>; 3], q: [f32x8<S>; 3]| {
-        let (x, y, z) = (p[0] - q[0], p[1] - q[1], p[2] - q[2]);
-        x * x + y * y + z * z
-    };
-    let (of_a, of_b, of_c) = (square(c, b), square(a, c), square(b, a));
-    // Which vertex comes first: b, c, or else a.
-    let last = of_c.simd_gt(of_a.max(of_b));
-    let middle = of_b.simd_gt(of_a) & !last;
-    let pick = |p: f32x8<S>, q: f32x8<S>, r: f32x8<S>| last.select(r, middle.select(q, p));
-    for i in 0..3 {
-        leaf.vertices[0][i] = pick(a[i], b[i], c[i]).into();
-        leaf.vertices[1][i] = pick(b[i], c[i], a[i]).into();
-        leaf.vertices[2][i] = pick(c[i], a[i], b[i]).into();
+
+    /// Instead of v₁ and v₂.
+    #[inline(always)]
+    fn edges(&self, leaf: &mut Leaf, numbers: &[u32]) {
+        for (lane, &number) in numbers.iter().enumerate().take(8) {
+            let [a, b, c] = self.triangles[number as usize].map(|v| self.positions[v as usize]);
+            let [a, b, c] = match leaf.id[lane] >> ROTATION {
+                0 => [a, b, c],
+                1 => [b, c, a],
+                _ => [c, a, b],
+            };
+            for (rows, v) in leaf.vertices[1..].iter_mut().zip([b, c]) {
+                let e = self.frame.local_difference(v, a);
+                for i in 0..3 {
+                    rows[i][lane] = e[i] as f32;
+                }
+            }
+        }
     }
-    let lengths = pick(of_b, of_c, of_a).sqrt() + pick(of_c, of_a, of_b).sqrt();
-    // Differences, squares, sums, roots, the last sum and these two: less than 8 roundings; and squares that underflow.
-    let size = lengths * f32x8::splat(simd, 1.0 + 16.0 * E) + f32x8::splat(simd, 2e-22);
-    let most: f32x8<S> = most.simd_into(simd);
-    leaf.size = size.min(most).into();
-    let id: u32x8<S> = leaf.id.simd_into(simd);
-    let turned = |places: u32| u32x8::splat(simd, places << ROTATION);
-    let plain = is_short(simd, [a, b, c]).select(u32x8::splat(simd, PLAIN), u32x8::splat(simd, 0));
-    leaf.id = (id | plain | last.select(turned(2), middle.select(turned(1), turned(0)))).into();
-    leaf
 }
 
 /// Whether all coordinates are multiples of 2⁻⁵², as those of f32 are that do not lie between 0 and 2⁻²⁹. They are at most 1, so
@@ -129,28 +150,21 @@ fn is_short<S: Simd>(simd: S, vertices: [[f32x8<S>; 3]; 3]) -> mask32x8<S> {
     !long
 }
 
-/// The leaf of any triangles: edges are worked out in f64.
-fn of_edges(frame: &Frame, positions: &[DVec3], triangles: &[[u32; 3]], numbers: &[u32]) -> Leaf {
-    let mut leaf = EMPTY;
-    for (lane, &number) in numbers.iter().enumerate() {
-        let vertices = triangles[number as usize].map(|v| positions[v as usize]);
-        let lengths = [0, 1, 2].map(|i| {
-            let e = frame.local_difference(vertices[(i + 2) % 3], vertices[(i + 1) % 3]);
-            e.length_squared()
-        });
-        let rotation = (0..3).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
-        let [a, b, c] = [0, 1, 2].map(|i| vertices[(i + rotation) % 3]);
-        let (v0, e1, e2) = (frame.local(a), frame.local_difference(b, a), frame.local_difference(c, a));
-        for (rows, v) in leaf.vertices.iter_mut().zip([v0, e1, e2]) {
-            for i in 0..3 {
-                rows[i][lane] = v[i] as f32;
-            }
-        }
-        // Two square roots and a sum in f64, and one rounding to f32.
-        leaf.size[lane] = ((e1.length() + e2.length()) * (1.0 + 2.0 * f64::from(E))) as f32;
-        leaf.id[lane] = number | (rotation as u32) << ROTATION;
-    }
-    leaf
+type Vec8<S> = [f32x8<S>; 3];
+
+#[inline(always)]
+fn load<S: Simd>(simd: S, rows: &[[f32; 8]; 3]) -> Vec8<S> {
+    [rows[0].simd_into(simd), rows[1].simd_into(simd), rows[2].simd_into(simd)]
+}
+
+#[inline(always)]
+fn minus<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn square<S: Simd>(a: Vec8<S>) -> f32x8<S> {
+    a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
 }
 
 #[cfg(test)]
