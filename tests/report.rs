@@ -6,6 +6,8 @@ mod support;
 
 #[path = "../examples/speed_vs_error/aftermath.rs"]
 mod aftermath;
+#[path = "../examples/speed_vs_error/block.rs"]
+mod block;
 #[path = "../examples/speed_vs_error/fallbacks.rs"]
 mod fallbacks;
 #[path = "../examples/speed_vs_error/kernels.rs"]

@@ -1,5 +1,6 @@
 //! What follows a hit: its point, its normal, and the ray that leaves it.
 
+use crate::block;
 use crate::kernels::{Entry, Origin};
 use crate::rows::Sheet;
 use crate::support::big::{Big, Big3};
@@ -61,20 +62,37 @@ impl Aftermath {
         else {
             return;
         };
-        if !truth.parts.contains(&hit.part) || !hit.lambda.is_finite() {
+        let boxed = matches!(case.solid, Solid::Slab { .. });
+        if !(boxed || truth.parts.contains(&hit.part)) || !hit.lambda.is_finite() {
+            return;
+        }
+        // Where a ray enters a box; not one that starts inside, which is told where that would have been.
+        let min = case.within.min;
+        if boxed && min.is_finite() && lambda.cmp(&Big::from(min)).is_le() {
             return;
         }
         let exact_point = Big3(std::array::from_fn(|k| {
             &Big::from(case.ray.origin[k]) + &(lambda * &Big::from(case.ray.direction[k]))
         }));
-        let Some(exact_normal) = normal_at(&case.solid, &exact_point, hit.part) else { return };
         let (point, bound, normal) = if shipped {
             let p = shape.point(&case.ray, &hit);
             (p.position, p.error, shape.normal(&case.ray, &hit))
         } else {
             let p = textbook_point(entry.origin, &case.ray, &hit);
-            let normal = if p.is_finite() { normal_at(&case.solid, &p.into(), hit.part) } else { None };
+            let normal = match &case.solid {
+                _ if !p.is_finite() => None,
+                Solid::Slab { min, max } => Some(block::normal_at(*min, *max, &p.into(), -case.ray.direction)),
+                solid => normal_at(solid, &p.into(), hit.part),
+            };
             (p, f64::INFINITY, normal.unwrap_or(DVec3::NAN))
+        };
+        let exact_normal = match &case.solid {
+            // At an edge any of its faces.
+            Solid::Slab { min, max } => block::normal_at(*min, *max, &exact_point, normal),
+            solid => {
+                let Some(normal) = normal_at(solid, &exact_point, hit.part) else { return };
+                normal
+            }
         };
         if !point.is_finite() || near_apex(&case.solid, &exact_point, hit.part) {
             return;
@@ -131,7 +149,7 @@ fn largest(solid: &Solid) -> f64 {
             let grown = [m.x_axis, m.y_axis, m.z_axis].map(|c| of(&[c])).iter().sum::<f64>();
             of(&[world_from_object.translation]) + largest(inner) * grown
         }
-        Solid::Slab { .. } => f64::NAN,
+        Solid::Slab { min, max } => of(&[*min, *max]),
     }
 }
 
@@ -301,7 +319,7 @@ fn distance(solid: &Solid, p: &Big3, part: u32) -> f64 {
             let stretch = to_f64(&transposed(map, &n)).length() / to_f64(&n).length();
             distance(inner, &q, part) / stretch
         }
-        Solid::Slab { .. } => f64::NAN,
+        Solid::Slab { min, max } => block::distance(*min, *max, p),
     }
 }
 

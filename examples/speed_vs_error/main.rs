@@ -11,6 +11,7 @@ mod support;
 mod meshes;
 
 mod aftermath;
+mod block;
 mod fallbacks;
 mod kernels;
 mod page;

@@ -110,7 +110,7 @@ pub fn make_shape(solid: &Solid) -> Option<Box<dyn Shape>> {
         }
         Solid::Mesh { positions, triangles } => boxed(Mesh::new(positions.clone(), triangles.clone())),
         Solid::Affine { world_from_object, inner, .. } => boxed(Affine::new(make_shape(inner)?, *world_from_object)),
-        Solid::Slab { .. } => None,
+        Solid::Slab { min, max } => boxed::<_, ()>(Ok(crate::block::Block { min: *min, max: *max })),
     }
 }
 
