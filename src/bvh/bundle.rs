@@ -1,21 +1,27 @@
 //! Rays that go the same way, walked together.
 //!
-//! A node's boxes are tested with the bounds of all origins and inverse directions first, at the price of one ray, and what is
-//! left with each ray, eight a vector: docs/numerics.md §10.
+//! A node's boxes are tested with the bounds of all origins and inverse directions first, at the price of one ray, and each
+//! box that is next in turn with all rays, eight a vector: docs/numerics.md §10.
 
 use super::frame::Frame;
-use super::slab::{E, LENGTHS, NEAR, PLAIN_ERROR, SLAB, STEEPEST, Sure, plain_ends};
+use super::slab::{E, LENGTHS, NEAR, PLAIN_ERROR, SLAB, STEEPEST};
 use super::traverse::Stack;
 use super::wide::{LEAF, Wide, WideNode, near_rows};
 use crate::{Interval, Ray};
 use fearless_simd::{Simd, f32x8, f64x4, prelude::*};
 
 /// How many rays a bundle has.
-pub(crate) const RAYS: usize = 16;
+pub(crate) const RAYS: usize = 32;
+
+/// And in how many vectors.
+pub(crate) const EIGHTS: usize = RAYS / 8;
 
 /// Bundles wider than this, in directions over their length and in origins over the tree's size, would visit much that
 /// none of their rays meets.
 const WIDEST: f32 = 1.0 / 8.0;
+
+/// Rays from one place share more.
+const WIDEST_FROM_ONE_PLACE: f32 = 0.5;
 
 /// Slopes steeper than this, against the direction's longest coordinate, have inverses that bound nothing: such an axis is left
 /// out of the bounds, as is one on which the rays go either way.
@@ -26,6 +32,30 @@ const UNDERFLOW: f32 = 1e-30;
 
 /// Farther than any t.
 const FAR: f32 = 1e30;
+
+/// Ends that are farther apart than this, in roundings of 1 + the largest coordinate, are not one place.
+const ONE_PLACE: f32 = 8.0 * E;
+
+/// No place that rays end at is farther from where they start, nor from the tree.
+const BACK: [f32; 2] = [16.0, 8.0];
+
+/// As [`PLAIN_ERROR`], of the end of a ray: 48u are needed.
+const BACK_ERROR: f32 = 4.0 * PLAIN_ERROR;
+
+/// Beyond this limits of t are all alike: 2¹⁰⁰.
+const FARTHEST_T: f32 = 1_125_899_906_842_624.0 * 1_125_899_906_842_624.0;
+
+/// Slack of a limit at or near zero: 2⁻⁶⁰, as [`Limits`](super::Limits) has it.
+const TINY: f32 = 1.0 / (1u64 << 60) as f32;
+
+/// From which end the rays of a bundle are looked at.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Start {
+    /// t = λ.
+    Origin,
+    /// t = `max` − λ: from where the interval ends, backwards.
+    End,
+}
 
 /// Eight rays, by lane, in the tree's frame as [`LocalRay`](super::LocalRay) has them.
 #[derive(Clone, Copy, Debug)]
@@ -38,59 +68,89 @@ pub(crate) struct Eight {
     pub(crate) t_min: [f32; 8],
     /// −∞ for a ray that has its answer.
     pub(crate) t_max: [f32; 8],
-    sure_min: [f32; 8],
-    sure_max: [f32; 8],
+    /// What lies between these is certainly inside the ray's interval.
+    pub(crate) sure_min: [f32; 8],
+    pub(crate) sure_max: [f32; 8],
 }
 
-/// Numbers of eight rays, as vectors.
+/// Four numbers each of eight rays, two rays a vector: the numbers by ray.
 #[inline(always)]
-fn gather<S: Simd>(simd: S, x: [f64; 8]) -> [f64x4<S>; 2] {
-    [f64x4::simd_from(simd, [x[0], x[1], x[2], x[3]]), f64x4::simd_from(simd, [x[4], x[5], x[6], x[7]])]
+fn columns<S: Simd>([a, b, c, d]: [f32x8<S>; 4]) -> [f32x8<S>; 4] {
+    let ((xz_low, yw_low), (xz_high, yw_high)) = (a.deinterleave(b), c.deinterleave(d));
+    let ((x, z), (y, w)) = (xz_low.deinterleave(xz_high), yw_low.deinterleave(yw_high));
+    [x, y, z, w]
 }
 
 impl Eight {
-    /// The rays in the frame, as [`LocalRay::new`](super::LocalRay::new) takes those that it takes as they are. `None` if an
-    /// interval is empty.
-    #[inline(always)]
-    fn new<S: Simd>(simd: S, frame: &Frame, rays: &[(Ray, Interval); 8]) -> Option<Self> {
-        let [mut min, mut max] = [[0.0; 8]; 2];
-        for (lane, (_, within)) in rays.iter().enumerate() {
-            (min[lane], max[lane]) = (within.min, within.max);
-        }
-        let (min, max) = (gather(simd, min), gather(simd, max));
-        // A NaN is below nothing.
-        let full = min[0].simd_lt(max[0]) & min[1].simd_lt(max[1]);
-        if full.to_bitmask() as u32 & 0xf != 0xf {
-            return None;
-        }
-        let ([t_min, sure_min], [sure_max, t_max]) = (plain_ends(simd, min), plain_ends(simd, max));
-        let (t_min, t_max) = (t_min.into(), t_max.into());
-        let (sure_min, sure_max) = (sure_min.into(), sure_max.into());
+    const EMPTY: Self = Self {
+        origin: [[0.0; 8]; 3],
+        direction: [[0.0; 8]; 3],
+        inv: [[0.0; 8]; 3],
+        near_shift: [[0.0; 8]; 3],
+        far_shift: [[0.0; 8]; 3],
+        t_min: [0.0; 8],
+        t_max: [0.0; 8],
+        sure_min: [0.0; 8],
+        sure_max: [0.0; 8],
+    };
 
-        let (one, steepest) = (f32x8::splat(simd, 1.0), f32x8::splat(simd, STEEPEST));
-        let [mut origin, mut direction, mut inv, mut near_shift, mut far_shift] = [[[0.0; 8]; 3]; 5];
-        for axis in 0..3 {
-            let [mut o, mut d] = [[0.0; 8]; 2];
-            for (lane, (ray, _)) in rays.iter().enumerate() {
-                (o[lane], d[lane]) = (ray.origin[axis], ray.direction[axis]);
+    /// Takes the rays into the frame, as [`LocalRay::new`](super::LocalRay::new) takes those that it takes as they are. Returns the
+    /// largest coordinate of each direction and of the way to the far end, and whether all intervals are longer than a
+    /// rounding of f32.
+    #[inline(always)]
+    fn set<S: Simd>(
+        &mut self,
+        simd: S,
+        frame: &Frame,
+        rays: &[(Ray, Interval); 8],
+        from: Start,
+    ) -> ([f32x8<S>; 2], bool) {
+        let scale = frame.scale;
+        let center = f64x4::simd_from(simd, [frame.center.x, frame.center.y, frame.center.z, 0.0]);
+        let to_frame = [f64x4::splat(simd, scale), f64x4::simd_from(simd, [scale, scale, 1.0, 1.0])];
+        let back = f64x4::simd_from(simd, [scale, scale, scale, 0.0]);
+        let mut halves = [[f32x8::splat(simd, 0.0); 4]; 2];
+        for i in 0..4 {
+            let [mut first, mut second] = [[f64x4::splat(simd, 0.0); 2]; 2];
+            for k in 0..2 {
+                let (Ray { origin: o, direction: d }, Interval { min, max }) = rays[2 * i + k];
+                first[k] = (f64x4::simd_from(simd, [o.x, o.y, o.z, d.x]) - center) * to_frame[0];
+                second[k] = f64x4::simd_from(simd, [d.y, d.z, min, max]) * to_frame[1];
+                if from == Start::End {
+                    first[k] += f64x4::simd_from(simd, [d.x, d.y, d.z, 0.0]) * (back * max);
+                }
             }
-            let ([oa, ob], [da, db]) = (gather(simd, o), gather(simd, d));
-            let (center, scale) = (f64x4::splat(simd, frame.center[axis]), f64x4::splat(simd, frame.scale));
-            let o: f32x8<S> = ((oa - center) * scale).relaxed_narrow((ob - center) * scale);
-            let d: f32x8<S> = (da * scale).relaxed_narrow(db * scale);
-            let slope = d.abs().simd_lt(1.0 / STEEPEST).select(steepest, one / d);
-            let pad = o.abs().mul_add(f32x8::splat(simd, SLAB), f32x8::splat(simd, SLAB + 2.0 * PLAIN_ERROR));
-            let (middle, half) = (o * slope, slope.abs() * pad);
-            (origin[axis], direction[axis], inv[axis]) = (o.into(), d.into(), slope.into());
-            (near_shift[axis], far_shift[axis]) = ((-middle - half).into(), (half - middle).into());
+            halves[0][i] = first[0].relaxed_narrow(first[1]);
+            halves[1][i] = second[0].relaxed_narrow(second[1]);
         }
-        Some(Self { origin, direction, inv, near_shift, far_shift, t_min, t_max, sure_min, sure_max })
-    }
-
-    /// What is certainly inside the interval of ray `lane`.
-    #[inline(always)]
-    pub(crate) fn sure(&self, lane: usize) -> Sure {
-        Sure { min: self.sure_min[lane & 7], max: self.sure_max[lane & 7] }
+        let ([ox, oy, oz, dx], [dy, dz, min, max]) = (columns(halves[0]), columns(halves[1]));
+        // A NaN is below nothing.
+        let long = min.simd_lt(max).to_bitmask() == 0xff;
+        let farthest = f32x8::splat(simd, FARTHEST_T);
+        let (min, max) = (min.min(farthest).max(-farthest), max.min(farthest).max(-farthest));
+        let (rounding, tiny) = (f32x8::splat(simd, 4.0 * E), f32x8::splat(simd, TINY));
+        let slack = [min.abs().mul_add(rounding, tiny), max.abs().mul_add(rounding, tiny)];
+        let (o, mut d) = ([ox, oy, oz], [dx, dy, dz]);
+        let (mut ends, mut slacks, mut error) = ([min, max], slack, PLAIN_ERROR);
+        if from == Start::End {
+            d = [-dx, -dy, -dz];
+            ends = [f32x8::splat(simd, 0.0), max - min];
+            slacks = [tiny, slack[0] + slack[1]];
+            error = BACK_ERROR;
+        }
+        let (one, steepest) = (f32x8::splat(simd, 1.0), f32x8::splat(simd, STEEPEST));
+        for axis in 0..3 {
+            let (o, d) = (o[axis], d[axis]);
+            let slope = d.abs().simd_lt(1.0 / STEEPEST).select(steepest, one / d);
+            let pad = o.abs().mul_add(f32x8::splat(simd, SLAB), f32x8::splat(simd, SLAB + 2.0 * error));
+            let (middle, half) = (o * slope, slope.abs() * pad);
+            (self.origin[axis], self.direction[axis], self.inv[axis]) = (o.into(), d.into(), slope.into());
+            (self.near_shift[axis], self.far_shift[axis]) = ((-middle - half).into(), (half - middle).into());
+        }
+        (self.t_min, self.t_max) = ((ends[0] - slacks[0]).into(), (ends[1] + slacks[1]).into());
+        (self.sure_min, self.sure_max) = ((ends[0] + slacks[0]).into(), (ends[1] - slacks[1]).into());
+        let length = d[0].abs().max(d[1].abs()).max(d[2].abs());
+        ([length, length * max.abs()], long)
     }
 
     #[inline(always)]
@@ -131,7 +191,9 @@ impl Eight {
 /// Rays and the bounds of them all, rounded outward.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bundle {
-    pub(crate) rays: [Eight; RAYS / 8],
+    pub(crate) rays: [Eight; EIGHTS],
+    /// Where all rays start, but for [`origin_error`](Self::origin_error), if they do.
+    pub(crate) place: Option<[f32; 3]>,
     /// Bit i: the directions' coordinates i are negative.
     away: u32,
     /// On some axis they are not all of one sign.
@@ -139,6 +201,8 @@ pub(crate) struct Bundle {
     /// The end of the origins' range that is nearest to a plane in front, by axis, and the farthest.
     near_origin: [f32; 3],
     far_origin: [f32; 3],
+    /// The least and the greatest direction.
+    pub(crate) directions: [[f32; 3]; 2],
     /// The least and the greatest 1/direction.
     inverse: [[f32; 3]; 2],
     t_min: f32,
@@ -148,109 +212,151 @@ pub(crate) struct Bundle {
     pub(crate) size: f32,
     /// The shortest and the longest direction, by their largest coordinates.
     pub(crate) lengths: [f32; 2],
+    /// Each coordinate of the place was off the rays by at most this before it was rounded; without one, each of an origin off its ray.
+    pub(crate) origin_error: f32,
+}
+
+/// The least and the greatest of all lanes.
+#[inline(always)]
+fn range<S: Simd>(vectors: [f32x8<S>; EIGHTS]) -> [f32; 2] {
+    let (mut least, mut most) = (vectors[0], vectors[0]);
+    for vector in &vectors[1..] {
+        (least, most) = (least.min(*vector), most.max(*vector));
+    }
+    [least.reduce_min(), most.reduce_max()]
 }
 
 #[inline(always)]
-fn pair<S: Simd>(simd: S, a: &[f32; 8], b: &[f32; 8]) -> [f32x8<S>; 2] {
-    [f32x8::simd_from(simd, *a), f32x8::simd_from(simd, *b)]
-}
-
-/// The least and the greatest of all lanes of two vectors.
-#[inline(always)]
-fn range<S: Simd>([a, b]: [f32x8<S>; 2]) -> [f32; 2] {
-    [a.min(b).reduce_min(), a.max(b).reduce_max()]
+fn largest([low, high]: [f32; 2]) -> f32 {
+    if -low > high { -low } else { high }
 }
 
 impl Bundle {
-    /// `None` if the rays go very different ways, if one of them is not taken as it is by
-    /// [`LocalRay::new`](super::LocalRay::new), or if an interval is empty.
+    /// None that is of use.
+    pub(crate) const EMPTY: Self = Self {
+        rays: [Eight::EMPTY; EIGHTS],
+        place: None,
+        away: 0,
+        mixed: false,
+        near_origin: [FAR; 3],
+        far_origin: [-FAR; 3],
+        directions: [[0.0; 3]; 2],
+        inverse: [[1.0; 3]; 2],
+        t_min: 0.0,
+        t_max: 0.0,
+        size: 0.0,
+        lengths: [0.0; 2],
+        origin_error: 0.0,
+    };
+
+    /// Makes these rays the bundle's, which was [`EMPTY`](Self::EMPTY) or refused others. `false` if the rays go very different ways, if one of
+    /// them is not taken as it is by [`LocalRay::new`](super::LocalRay::new), or if an interval is empty; from the end,
+    /// if that is not one place.
     #[inline(always)]
-    pub(crate) fn new<S: Simd>(simd: S, frame: &Frame, rays: &[(Ray, Interval); RAYS]) -> Option<Self> {
-        let (halves, _) = rays.as_chunks::<8>();
-        let eights = [Eight::new(simd, frame, &halves[0])?, Eight::new(simd, frame, &halves[1])?];
+    pub(crate) fn take<S: Simd>(
+        &mut self,
+        simd: S,
+        frame: &Frame,
+        rays: &[(Ray, Interval); RAYS],
+        from: Start,
+    ) -> bool {
         // No closures over vectors here and below: one that is not inlined makes calls of all that it does.
-        let [a, b] = &eights;
-        let o = [
-            pair(simd, &a.origin[0], &b.origin[0]),
-            pair(simd, &a.origin[1], &b.origin[1]),
-            pair(simd, &a.origin[2], &b.origin[2]),
-        ];
-        let d = [
-            pair(simd, &a.direction[0], &b.direction[0]),
-            pair(simd, &a.direction[1], &b.direction[1]),
-            pair(simd, &a.direction[2], &b.direction[2]),
-        ];
-        let longest =
-            [d[0][0].abs().max(d[1][0].abs()).max(d[2][0].abs()), d[0][1].abs().max(d[1][1].abs()).max(d[2][1].abs())];
-        let (origins, directions) = ([range(o[0]), range(o[1]), range(o[2])], [range(d[0]), range(d[1]), range(d[2])]);
-        let lengths = range(longest);
-        let [t_min, _] = range(pair(simd, &a.t_min, &b.t_min));
-        let [_, t_max] = range(pair(simd, &a.t_max, &b.t_max));
-        // Sums of a NaN or an infinity with others are one, and fail the comparisons below.
-        let all = (o[0][0] + o[1][0] + o[2][0]) + (d[0][0] + d[1][0] + d[2][0]);
-        let sum = (all + (o[0][1] + o[1][1] + o[2][1]) + (d[0][1] + d[1][1] + d[2][1])).reduce_sum();
-        let largest = |[low, high]: [f32; 2]| if -low > high { -low } else { high };
-        let size = origins.iter().fold(0.0, |m: f32, &r| m.max(largest(r)));
-        let plain = (size <= NEAR) & (lengths[0] >= LENGTHS[0]) & (lengths[1] <= LENGTHS[1]) & sum.is_finite();
-        let alike = |axis: usize| {
-            let ([o_low, o_high], [d_low, d_high]) = (origins[axis], directions[axis]);
-            (o_high - o_low <= WIDEST) & (d_high - d_low <= WIDEST * lengths[0])
-        };
-        if !(plain & alike(0) & alike(1) & alike(2)) {
-            return None;
+        let (eights, _) = rays.as_chunks::<8>();
+        let zero = f32x8::splat(simd, 0.0);
+        let [mut lengths, mut ways, mut t_min, mut t_max] = [[zero; EIGHTS]; 4];
+        let mut long = true;
+        for i in 0..EIGHTS {
+            let eight = &mut self.rays[i];
+            let ([length, way], all_long) = eight.set(simd, frame, &eights[i], from);
+            (lengths[i], ways[i]) = (length, way);
+            (t_min[i], t_max[i]) = (eight.t_min.simd_into(simd), eight.t_max.simd_into(simd));
+            long &= all_long;
         }
-        let mut bundle = Self {
-            rays: eights,
-            away: 0,
-            mixed: false,
-            near_origin: [FAR; 3],
-            far_origin: [-FAR; 3],
-            inverse: [[1.0; 3]; 2],
-            t_min,
-            t_max,
-            size,
-            lengths,
+        // Sums of a NaN or an infinity with others are one, and fail the comparisons below.
+        let mut sum = zero;
+        let [mut origins, mut directions] = [[[0.0; 2]; 3]; 2];
+        for axis in 0..3 {
+            let [mut o, mut d] = [[zero; EIGHTS]; 2];
+            for (i, eight) in self.rays.iter().enumerate() {
+                (o[i], d[i]) = (eight.origin[axis].simd_into(simd), eight.direction[axis].simd_into(simd));
+                sum += o[i] + d[i];
+            }
+            (origins[axis], directions[axis]) = (range(o), range(d));
+        }
+        self.lengths = range(lengths);
+        ([self.t_min, _], [_, self.t_max]) = (range(t_min), range(t_max));
+        let [mut size, mut spread, mut turn] = [0.0; 3];
+        for axis in 0..3 {
+            let ([o_low, o_high], [d_low, d_high]) = (origins[axis], directions[axis]);
+            let (far, apart) = (largest(origins[axis]), o_high - o_low);
+            size = if far > size { far } else { size };
+            spread = if apart > spread { apart } else { spread };
+            turn = if d_high - d_low > turn { d_high - d_low } else { turn };
+        }
+        let one_place = spread <= ONE_PLACE * (1.0 + size);
+        let widest = if one_place { WIDEST_FROM_ONE_PLACE } else { WIDEST };
+        let alike = (spread <= widest) & (turn <= widest * self.lengths[0]);
+        let (farthest, shortest, error) = match from {
+            Start::Origin => (NEAR, LENGTHS[0], PLAIN_ERROR),
+            Start::End => (BACK[1], 2.0 * LENGTHS[0], BACK_ERROR),
         };
+        let plain = (size <= farthest) & (self.lengths[0] >= shortest) & (self.lengths[1] <= LENGTHS[1]);
+        let ends = (from == Start::Origin) || one_place & (range(ways)[1] <= BACK[0]);
+        if !(long & plain & alike & ends & sum.reduce_sum().is_finite()) {
+            return false;
+        }
+        self.place = one_place.then_some([origins[0][0], origins[1][0], origins[2][0]]);
+        self.size = size;
+        // The difference of the two is rounded.
+        self.origin_error = if one_place { error + spread * (1.0 + 4.0 * E) } else { error };
         for axis in 0..3 {
             let (o, d) = (origins[axis], directions[axis]);
-            let off = 4.0 * E * largest(o) + 2.0 * PLAIN_ERROR;
+            (self.directions[0][axis], self.directions[1][axis]) = (d[0], d[1]);
+            let off = 4.0 * E * largest(o) + 2.0 * error;
             let (low, high) = (o[0] - off, o[1] + off);
             let backward = d[0] < 0.0;
             let gentlest = if d[0].abs() < d[1].abs() { d[0].abs() } else { d[1].abs() };
-            if backward != (d[1] < 0.0) || gentlest < FLATTEST * lengths[0] {
-                bundle.mixed = true;
+            if backward != (d[1] < 0.0) || gentlest < FLATTEST * self.lengths[0] {
+                self.mixed = true;
                 continue;
             }
-            bundle.away |= u32::from(backward) << axis;
-            (bundle.near_origin[axis], bundle.far_origin[axis]) = if backward { (low, high) } else { (high, low) };
+            self.away |= u32::from(backward) << axis;
+            (self.near_origin[axis], self.far_origin[axis]) = if backward { (low, high) } else { (high, low) };
             // Of directions with one sign the greatest has the least inverse. The margin is for five roundings: of the direction,
             // of its inverse, and of difference and product in the test.
             let (least, greatest) = (1.0 / d[1], 1.0 / d[0]);
-            bundle.inverse[0][axis] = least - least.abs() * (8.0 * E);
-            bundle.inverse[1][axis] = greatest + greatest.abs() * (8.0 * E);
+            self.inverse[0][axis] = least - least.abs() * (8.0 * E);
+            self.inverse[1][axis] = greatest + greatest.abs() * (8.0 * E);
         }
-        Some(bundle)
+        true
     }
 
-    /// Which of `rays` may meet the box of lane `lane`.
+    /// Which rays may meet the box of lane `lane`.
     #[inline(always)]
-    fn meet<S: Simd>(&self, simd: S, node: &WideNode, lane: usize, near: &[u32; 3], rays: u32) -> u32 {
+    fn meet<S: Simd>(&self, simd: S, node: &WideNode, lane: usize, near: &[u32; 3]) -> u32 {
         let mut met = 0;
         for (i, eight) in self.rays.iter().enumerate() {
-            if rays >> (8 * i) & 0xff != 0 {
-                let of_eight =
-                    if self.mixed { eight.meet_mixed(simd, node, lane) } else { eight.meet(simd, node, lane, near) };
-                met |= of_eight << (8 * i);
-            }
+            let of_eight =
+                if self.mixed { eight.meet_mixed(simd, node, lane) } else { eight.meet(simd, node, lane, near) };
+            met |= of_eight << (8 * i);
         }
-        met & rays
+        met
+    }
+
+    /// The ray has its answer.
+    #[inline(always)]
+    pub(crate) fn end(&mut self, ray: usize) {
+        self.rays[ray / 8 % EIGHTS].t_max[ray % 8] = f32::NEG_INFINITY;
     }
 
     /// Keeps the largest t that matters, after one of the rays' has changed.
     #[inline(always)]
     pub(crate) fn shorten<S: Simd>(&mut self, simd: S) {
-        let [_, last] = range(pair(simd, &self.rays[0].t_max, &self.rays[1].t_max));
-        self.t_max = last;
+        let mut last: f32x8<S> = self.rays[0].t_max.simd_into(simd);
+        for eight in &self.rays[1..] {
+            last = last.max(f32x8::simd_from(simd, eight.t_max));
+        }
+        self.t_max = last.reduce_max();
     }
 
     /// The bounds in every lane.
@@ -310,35 +416,38 @@ pub(crate) trait Together<S: Simd> {
 pub(crate) fn together<S: Simd>(simd: S, tree: &Wide, walk: &mut impl Together<S>) {
     let nodes = &tree.nodes[..];
     let bounds = walk.bundle().bounds(simd);
-    let mut stack = Stack::<i128>::new();
-    let (mut at, mut rays) = (0, (1 << RAYS) - 1);
+    // Boxes by where they stand: node and lane.
+    let mut stack = Stack::<i64>::new();
+    let mut at = 0;
     loop {
-        if at & LEAF == 0 {
-            let (node, bundle) = (&nodes[at as usize], walk.bundle());
-            let (mut hits, enter) = bounds.test(simd, node, bundle.t_max);
-            let enter: [f32; 8] = enter.into();
-            stack.reserve();
-            let mut count = 0;
-            while hits != 0 {
-                let lane = hits.trailing_zeros() as usize & 7;
-                hits &= hits - 1;
-                let met = bundle.meet(simd, node, lane, &bounds.near, rays);
-                if met != 0 {
-                    // Signed, as a single ray's entries are.
-                    let t = i128::from(enter[lane].to_bits() as i32);
-                    stack.insert(t << 64 | i128::from(met) << 32 | i128::from(node.child(lane)), count);
-                    count += 1;
-                }
-            }
-        } else {
-            walk.leaf(simd, at & !LEAF, rays);
+        let (mut hits, enter) = bounds.test(simd, &nodes[at as usize], walk.bundle().t_max);
+        let enter: [f32; 8] = enter.into();
+        stack.reserve();
+        let mut count = 0;
+        while hits != 0 {
+            let lane = hits.trailing_zeros();
+            hits &= hits - 1;
+            // Signed, as a single ray's entries are.
+            let t = enter[lane as usize & 7].to_bits();
+            stack.insert((u64::from(t) << 32 | u64::from(at << 3 | lane)) as i64, count);
+            count += 1;
         }
-        loop {
+        at = loop {
             let Some(entry) = stack.pop() else { return };
-            if f32::from_bits((entry >> 64) as u32) <= walk.bundle().t_max {
-                (at, rays) = (entry as u32, (entry >> 32) as u32);
-                break;
+            let bundle = walk.bundle();
+            if f32::from_bits((entry >> 32) as u32) > bundle.t_max {
+                continue;
             }
-        }
+            let (node, lane) = (&nodes[(entry as u32 >> 3) as usize], entry as usize & 7);
+            let rays = bundle.meet(simd, node, lane, &bounds.near);
+            if rays == 0 {
+                continue;
+            }
+            let child = node.child(lane);
+            if child & LEAF == 0 {
+                break child;
+            }
+            walk.leaf(simd, child & !LEAF, rays);
+        };
     }
 }

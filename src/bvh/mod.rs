@@ -24,10 +24,10 @@ mod wide;
 
 pub use level::Level;
 
-pub(crate) use bundle::{Bundle, RAYS, Together, together};
+pub(crate) use bundle::{Bundle, EIGHTS, Eight, RAYS, Start, Together, together};
 pub(crate) use collapse::build;
 pub(crate) use frame::{Frame, FrameBox};
-pub(crate) use slab::{E, Limits, LocalRay, PLAIN_ERROR, Sure};
+pub(crate) use slab::{E, Limits, LocalRay, Sure};
 pub(crate) use tasks::map;
 pub(crate) use traverse::{Any, Closest, Lanes, any, closest};
 pub(crate) use watch::Watch;

@@ -7,7 +7,7 @@
 use super::frame::Frame;
 use crate::kernel::float::power;
 use crate::{Interval, Ray};
-use fearless_simd::{Simd, f32x4, f32x8, f64x2, f64x4, prelude::*};
+use fearless_simd::{Simd, f32x4, f64x2, prelude::*};
 use glam::DVec3;
 
 /// A ray in the frame of a tree, with what the box and leaf tests need of it: `origin` + t·`direction`.
@@ -64,7 +64,7 @@ pub(super) const LENGTHS: [f32; 2] = [1.0 / 1_099_511_627_776.0, 1_099_511_627_7
 pub(super) const STEEPEST: f32 = LENGTHS[1] * LENGTHS[1];
 
 /// [`LocalRay::origin_error`] of a ray that is taken as it is: 4u are needed.
-pub(crate) const PLAIN_ERROR: f32 = 8.0 * f64::EPSILON as f32;
+pub(super) const PLAIN_ERROR: f32 = 8.0 * f64::EPSILON as f32;
 
 /// Origins beyond this, before or after, are not traced.
 const FARTHEST: f64 = 1_125_899_906_842_624.0; // 2⁵⁰
@@ -159,16 +159,6 @@ impl Limits {
     }
 }
 
-/// The least and the greatest t of eight λ, t = λ: as [`Limits::of`].
-#[inline(always)]
-pub(super) fn plain_ends<S: Simd>(simd: S, lambda: [f64x4<S>; 2]) -> [f32x8<S>; 2] {
-    let (farthest, tiny) = (f64x4::splat(simd, FARTHEST_T), f64x4::splat(simd, TINY));
-    let [a, b] = [lambda[0].min(farthest).max(-farthest), lambda[1].min(farthest).max(-farthest)];
-    let relative = f64x4::splat(simd, f64::EPSILON + NARROWING);
-    let [of_a, of_b] = [a.abs() * relative + tiny, b.abs() * relative + tiny];
-    [(a - of_a).relaxed_narrow(b - of_b), (a + of_a).relaxed_narrow(b + of_b)]
-}
-
 /// Beyond this limits are all alike.
 const FARTHEST_T: f64 = power(100);
 
@@ -178,8 +168,8 @@ const NARROWING: f64 = power(-23);
 /// What is certainly inside an interval: limits of t rounded inward.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sure {
-    pub(super) min: f32,
-    pub(super) max: f32,
+    min: f32,
+    max: f32,
 }
 
 impl Sure {

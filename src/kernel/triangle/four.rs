@@ -8,9 +8,21 @@ use crate::kernel::bound::{TRIANGLE_CONDITION, TRIANGLE_LAMBDA, TRIANGLE_SIDES, 
 use crate::kernel::cpu;
 use crate::kernel::eft::{Fused, Product, Split, two_diff, two_sum};
 use fearless_simd::{Simd, f64x4, mask64x4, prelude::*};
+use glam::DVec3;
 
 /// Of four vectors the x, the y and the z.
 pub type Vectors<S> = [f64x4<S>; 3];
+
+/// Gathers four vectors.
+#[inline(always)]
+#[must_use]
+pub fn vectors<S: Simd>(simd: S, [a, b, c, d]: [DVec3; 4]) -> Vectors<S> {
+    [
+        f64x4::simd_from(simd, [a.x, b.x, c.x, d.x]),
+        f64x4::simd_from(simd, [a.y, b.y, c.y, d.y]),
+        f64x4::simd_from(simd, [a.z, b.z, c.z, d.z]),
+    ]
+}
 
 /// Four rays, each with a triangle and an interval.
 #[derive(Clone, Copy, Debug)]
@@ -188,7 +200,6 @@ mod tests {
     use crate::kernel::tally::Tally;
     use crate::{Interval, Ray};
     use fearless_simd::dispatch;
-    use glam::DVec3;
 
     type Case = (Ray, [DVec3; 3], Interval);
 

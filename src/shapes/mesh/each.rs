@@ -1,15 +1,17 @@
-//! Closest and any hits of many rays. Where sixteen in a row go the same way they are walked as a bundle; the answers
+//! Closest and any hits of many rays. Where as many in a row as a bundle has go the same way they are walked together; the answers
 //! are those of each ray alone.
 
 use super::Mesh;
-use super::leaf::{Leaf, Margins, everywhere, filter};
-use super::query::{self, Nearest, occluded};
-use crate::bvh::{self, Bundle, Limits, RAYS, Sure};
+use super::leaf::{Margins, Spot, Verdict, filter};
+use super::query::{self, exactly, nearer, occluded};
+use super::seen::{Seen, View, everywhere};
+use super::settle::settle;
+use crate::bvh::{self, Bundle, EIGHTS, Limits, RAYS, Start};
 use crate::{Hit, Interval, Ray};
-use fearless_simd::{Simd, dispatch, f32x8, prelude::*};
+use fearless_simd::{Simd, dispatch, f32x8, mask32x8, prelude::*, u32x8};
 
 /// A ray and the stretch of it that counts.
-type Stretch = (Ray, Interval);
+pub(super) type Stretch = (Ray, Interval);
 
 /// `hits[i]` becomes the nearest hit of `rays[i]`.
 pub(super) fn closest(mesh: &Mesh, rays: &[Stretch], hits: &mut [Option<Hit>]) {
@@ -31,7 +33,7 @@ pub(super) fn any(mesh: &Mesh, rays: &[Stretch], hits: &mut [bool]) {
     );
 }
 
-/// Sixteen at a time by `together`, which may refuse, the others one by one. After a refusal bundles are tried ever more
+/// A bundle at a time by `together`, which may refuse, the others one by one. After a refusal bundles are tried ever more
 /// seldom, so that rays without any order cost no more than alone.
 fn each<T>(
     rays: &[Stretch],
@@ -65,135 +67,129 @@ fn each<T>(
 /// A first look that costs next to nothing: whether a few directions are alike. [`Bundle::new`] looks at all.
 fn go_together(rays: &[Stretch; RAYS]) -> bool {
     let first = rays[0].0.direction;
-    let close = 0.25 * first.abs().max_element();
-    [5, 10, 15].iter().all(|&i| (rays[i].0.direction - first).abs().max_element() <= close)
+    let close = 0.5 * first.abs().max_element();
+    (1..4).all(|i| (rays[i * (RAYS - 1) / 3].0.direction - first).abs().max_element() <= close)
 }
 
-/// What all rays of a bundle have in common.
-struct Common<'a> {
+/// Alike, whether the rays may end at one place.
+fn end_together(rays: &[Stretch; RAYS]) -> bool {
+    let end = |(ray, within): &Stretch| ray.origin + within.max * ray.direction;
+    let (first, last) = (end(&rays[0]), end(&rays[RAYS - 1]));
+    let way = rays[0].1.max.abs() * rays[0].0.direction.abs().max_element();
+    (first - last).abs().max_element() <= way * 1e-5
+}
+
+/// A bundle's walk, with what all its rays have in common.
+struct Walk<'a, A> {
     mesh: &'a Mesh,
-    bundle: Bundle,
+    rays: &'a [Stretch; RAYS],
+    bundle: &'a mut Bundle,
     margins: Margins,
+    view: Option<View>,
+    answers: A,
 }
 
-impl<'a> Common<'a> {
+/// What a bundle's rays want to know.
+trait Answers<S: Simd>: Sized {
+    /// Considers a triangle for those of eight rays that have a bit in `rays`, and answers which of them need no more.
+    fn of_eight(walk: &mut Walk<Self>, simd: S, spot: Spot, eight: usize, rays: u32, verdict: &Verdict<S>) -> u32;
+
+    /// Considers a triangle for one ray, which may pass it between the t of `depth`; `through`: certainly passes through its
+    /// inside. `true` if the ray needs no more.
+    fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, depth: [f32; 2]) -> bool;
+}
+
+impl<'a, A> Walk<'a, A> {
     #[inline(always)]
-    fn new<S: Simd>(simd: S, mesh: &'a Mesh, mut bundle: Bundle) -> Self {
-        let (margins, reach) = Margins::of_bundle(&bundle);
+    fn new<S: Simd>(simd: S, mesh: &'a Mesh, rays: &'a [Stretch; RAYS], bundle: &'a mut Bundle, answers: A) -> Self {
+        let (margins, reach) = Margins::of_bundle(bundle);
         let reach = f32x8::splat(simd, reach);
         for eight in &mut bundle.rays {
             let (t_min, t_max): (f32x8<S>, f32x8<S>) = (eight.t_min.simd_into(simd), eight.t_max.simd_into(simd));
             (eight.t_min, eight.t_max) = (t_min.max(-reach).into(), t_max.min(reach).into());
         }
-        Self { mesh, bundle, margins }
+        Self { mesh, rays, view: View::of(bundle), bundle, margins, answers }
     }
 
-    /// Calls `each` for every triangle of the leaf that one of `rays` may meet: with the triangle's lane, the ray, whether its line
-    /// certainly passes through, and the interval of t. It is given, and answers with, the t from which on nothing matters
-    /// to the ray.
+    /// Rays from one place: many triangle by triangle, few one by one.
     #[inline(always)]
-    fn visit<S: Simd>(
-        &mut self,
-        simd: S,
-        leaf: &Leaf,
-        mut rays: u32,
-        mut each: impl FnMut(usize, usize, bool, [f32; 2], f32) -> f32,
-    ) {
-        let triangles = leaf.triangles(simd, self.mesh.exact);
-        while rays != 0 {
-            let ray = rays.trailing_zeros() as usize & 15;
-            rays &= rays - 1;
-            let (eight, at) = (&mut self.bundle.rays[ray / 8], ray % 8);
-            // It got its answer after it was noted for this leaf.
-            if eight.t_max[at] == f32::NEG_INFINITY {
-                continue;
+    fn visit_from<S: Simd>(&mut self, simd: S, view: &View, number: u32, mut rays: u32)
+    where
+        A: Answers<S>,
+    {
+        let triangles = self.mesh.leaves[number as usize].triangles(simd, self.mesh.exact);
+        let seen = Seen::new(simd, &triangles, view, &self.margins);
+        if rays.count_ones() <= FEW {
+            while rays != 0 {
+                let ray = rays.trailing_zeros() as usize % RAYS;
+                rays &= rays - 1;
+                if let Some(verdict) = seen.ray(simd, &self.bundle.rays[ray / 8], ray % 8) {
+                    self.of_ray(simd, number, ray, &verdict);
+                }
             }
-            let [o, d] = [everywhere(simd, &eight.origin, at), everywhere(simd, &eight.direction, at)];
-            let stretch = [f32x8::splat(simd, eight.t_min[at]), f32x8::splat(simd, eight.t_max[at])];
-            let Some(outcome) = filter(simd, &triangles, [o, d], &self.margins, stretch) else { continue };
-            let mut lanes = outcome.maybe;
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize & 7;
-                lanes &= lanes - 1;
-                let (through, depth) = (outcome.through >> lane & 1 == 1, outcome.depths.interval(lane));
-                eight.t_max[at] = each(lane, ray, through, depth, eight.t_max[at]);
+            return;
+        }
+        let mut lanes = seen.lanes(simd, view);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros();
+            lanes &= lanes - 1;
+            for eight in 0..EIGHTS {
+                let of_these = rays >> (8 * eight) & 0xff;
+                if of_these == 0 {
+                    continue;
+                }
+                let Some(verdict) = seen.triangle(simd, lane as usize, &self.bundle.rays[eight]) else { continue };
+                let done = A::of_eight(self, simd, Spot { leaf: number, lane }, eight, of_these, &verdict);
+                rays &= !(done << (8 * eight));
             }
         }
-        self.bundle.shorten(simd);
+    }
+
+    /// Other rays: one by one, each with all triangles.
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, simd: S, number: u32, mut rays: u32)
+    where
+        A: Answers<S>,
+    {
+        let triangles = self.mesh.leaves[number as usize].triangles(simd, self.mesh.exact);
+        while rays != 0 {
+            let ray = rays.trailing_zeros() as usize % RAYS;
+            rays &= rays - 1;
+            let (eight, at) = (&self.bundle.rays[ray / 8], ray % 8);
+            let [o, d] = [everywhere(simd, &eight.origin, at), everywhere(simd, &eight.direction, at)];
+            let stretch = [f32x8::splat(simd, eight.t_min[at]), f32x8::splat(simd, eight.t_max[at])];
+            if let Some(verdict) = filter(simd, &triangles, [o, d], &self.margins, stretch) {
+                self.of_ray(simd, number, ray, &verdict);
+            }
+        }
+    }
+
+    /// What one ray meets in a leaf.
+    #[inline(always)]
+    fn of_ray<S: Simd>(&mut self, simd: S, leaf: u32, ray: usize, verdict: &Verdict<S>)
+    where
+        A: Answers<S>,
+    {
+        let outcome = verdict.outcome();
+        let mut lanes = outcome.maybe;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros();
+            lanes &= lanes - 1;
+            let (through, depth) = (outcome.through >> lane & 1 == 1, outcome.depths.interval(lane as usize));
+            if A::of_one(self, simd, Spot { leaf, lane }, ray, through, depth) {
+                break;
+            }
+        }
     }
 }
 
-/// `false`, and nothing done, if the rays are no bundle.
-#[inline(always)]
-fn closest_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mut [Option<Hit>; RAYS]) -> bool {
-    let Some(bundle) = Bundle::new(simd, mesh.frame(), rays) else { return false };
-    let mut walk = Nearests {
-        nearest: std::array::from_fn(|i| {
-            let (ray, within) = &rays[i];
-            let eight = &bundle.rays[i / 8];
-            Nearest::new(mesh, ray, *within, Limits::PLAIN, eight.sure(i % 8), eight.t_max[i % 8])
-        }),
-        common: Common::new(simd, mesh, bundle),
-    };
-    bvh::together(simd, &mesh.tree, &mut walk);
-    for (hit, nearest) in hits.iter_mut().zip(&mut walk.nearest) {
-        nearest.settle(simd, hit);
-    }
-    true
-}
+/// With as many rays, or fewer, a leaf is tested ray by ray.
+const FEW: u32 = 4;
 
-/// A bundle's walk to the nearest hits.
-struct Nearests<'a> {
-    common: Common<'a>,
-    nearest: [Nearest<'a>; RAYS],
-}
-
-impl<S: Simd> bvh::Together<S> for Nearests<'_> {
+impl<S: Simd, A: Answers<S>> bvh::Together<S> for Walk<'_, A> {
     #[inline(always)]
     fn bundle(&self) -> &Bundle {
-        &self.common.bundle
-    }
-
-    #[inline(never)]
-    fn leaf(&mut self, simd: S, number: u32, rays: u32) {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                let nearest = &mut self.nearest;
-                let leaf = &self.common.mesh.leaves[number as usize];
-                self.common.visit(simd, leaf, rays, |lane, ray, through, depth, last| {
-                    let nearest = &mut nearest[ray];
-                    nearest.consider(simd, [number, lane as u32], through, depth);
-                    if nearest.t_max < last { nearest.t_max } else { last }
-                });
-            },
-        );
-    }
-}
-
-/// `false`, and nothing done, if the rays are no bundle.
-#[inline(always)]
-fn any_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mut [bool; RAYS]) -> bool {
-    let Some(bundle) = Bundle::new(simd, mesh.frame(), rays) else { return false };
-    *hits = [false; RAYS];
-    let sure = std::array::from_fn(|i| bundle.rays[i / 8].sure(i % 8));
-    let mut walk = Until { rays, sure, common: Common::new(simd, mesh, bundle), hits };
-    bvh::together(simd, &mesh.tree, &mut walk);
-    true
-}
-
-/// A bundle's walk until all rays are known to hit something.
-struct Until<'a> {
-    rays: &'a [Stretch; RAYS],
-    sure: [Sure; RAYS],
-    common: Common<'a>,
-    hits: &'a mut [bool; RAYS],
-}
-
-impl<S: Simd> bvh::Together<S> for Until<'_> {
-    #[inline(always)]
-    fn bundle(&self) -> &Bundle {
-        &self.common.bundle
+        self.bundle
     }
 
     #[inline(never)]
@@ -201,16 +197,204 @@ impl<S: Simd> bvh::Together<S> for Until<'_> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let (hits, given, sure, mesh) = (&mut *self.hits, self.rays, &self.sure, self.common.mesh);
-                let leaf = &mesh.leaves[leaf as usize];
-                self.common.visit(simd, leaf, rays, |lane, ray, through, depth, last| {
-                    let (ref origin, within) = given[ray];
-                    hits[ray] = hits[ray]
-                        || through && sure[ray].holds(depth)
-                        || occluded(simd, mesh, origin, within, leaf, lane);
-                    if hits[ray] { f32::NEG_INFINITY } else { last }
-                });
+                match self.view {
+                    Some(view) => self.visit_from(simd, &view, leaf, rays),
+                    None => self.visit(simd, leaf, rays),
+                }
+                self.bundle.shorten(simd);
             },
         );
+    }
+}
+
+/// The lanes whose triangles are met inside their rays' intervals, for certain.
+#[inline(always)]
+fn certain<S: Simd>(simd: S, eight: &bvh::Eight, verdict: &Verdict<S>) -> mask32x8<S> {
+    let (min, max): (f32x8<S>, f32x8<S>) = (eight.sure_min.simd_into(simd), eight.sure_max.simd_into(simd));
+    verdict.through & verdict.low.simd_gt(min) & verdict.high.simd_lt(max)
+}
+
+/// `false`, and nothing done, if the rays are no bundle.
+#[inline(always)]
+fn closest_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mut [Option<Hit>; RAYS]) -> bool {
+    let mut bundle = Bundle::EMPTY;
+    if !bundle.take(simd, mesh.frame(), rays, Start::Origin) {
+        return false;
+    }
+    *hits = [None; RAYS];
+    let nearests = Nearests {
+        low: [[f32::INFINITY; 8]; EIGHTS],
+        spot: [[Spot::NOWHERE; 8]; EIGHTS],
+        remembered: 0,
+        settled: 0,
+        hits,
+    };
+    let mut walk = Walk::new(simd, mesh, rays, &mut bundle, nearests);
+    bvh::together(simd, &mesh.tree, &mut walk);
+    walk.settle(simd);
+    true
+}
+
+/// The search for the nearest hits. Of the triangles that are certainly hit the nearest so far is remembered, and whatever may
+/// not be told from it is settled in f64 at once; λ of what remains when the walk has ended.
+struct Nearests<'a> {
+    /// Not above t of the triangle that is remembered, at `spot`; t_max is not below.
+    low: [[f32; 8]; EIGHTS],
+    /// Leaf and lane.
+    spot: [[u32; 8]; EIGHTS],
+    /// The rays that have one remembered, and those that have one settled.
+    remembered: u32,
+    settled: u32,
+    /// The nearest of those that were settled.
+    hits: &'a mut [Option<Hit>; RAYS],
+}
+
+impl<S: Simd> Answers<S> for Nearests<'_> {
+    #[inline(always)]
+    fn of_eight(walk: &mut Walk<Self>, simd: S, spot: Spot, eight: usize, _: u32, verdict: &Verdict<S>) -> u32 {
+        let rays = &mut walk.bundle.rays[eight];
+        let [low, t_max]: [f32x8<S>; 2] = [walk.answers.low[eight].simd_into(simd), rays.t_max.simd_into(simd)];
+        let nearer = certain(simd, rays, verdict) & verdict.high.simd_lt(low);
+        let farther = verdict.through & verdict.low.simd_gt(t_max);
+        let spots = nearer.select(u32x8::splat(simd, spot.packed()), walk.answers.spot[eight].simd_into(simd));
+        walk.answers.spot[eight] = spots.into();
+        walk.answers.low[eight] = nearer.select(verdict.low, low).into();
+        rays.t_max = nearer.select(verdict.high.min(t_max), t_max).into();
+        walk.answers.remembered |= (nearer.to_bitmask() as u32) << (8 * eight);
+        let mut open = verdict.maybe & !((nearer | farther).to_bitmask() as u32);
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize;
+            open &= open - 1;
+            walk.confirm(simd, spot, 8 * eight + lane);
+        }
+        0
+    }
+
+    #[inline(always)]
+    fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, [low, high]: [f32; 2]) -> bool {
+        let (eight, lane) = (&mut walk.bundle.rays[ray / 8], ray % 8);
+        let t_max = &mut eight.t_max[lane];
+        if through && low > *t_max {
+            return false;
+        }
+        let of_ray = &mut walk.answers.low[ray / 8][lane];
+        if !(through & (low > eight.sure_min[lane]) & (high < eight.sure_max[lane]) & (high < *of_ray)) {
+            walk.confirm(simd, spot, ray);
+            return false;
+        }
+        *of_ray = low;
+        walk.answers.remembered |= 1 << ray;
+        walk.answers.spot[ray / 8][lane] = spot.packed();
+        if high < *t_max {
+            *t_max = high;
+        }
+        false
+    }
+}
+
+impl Walk<'_, Nearests<'_>> {
+    /// Settles whether and where a ray hits a triangle.
+    #[inline(never)]
+    fn confirm<S: Simd>(&mut self, simd: S, spot: Spot, ray: usize) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let (ref asked, within) = self.rays[ray % RAYS];
+                let Some(hit) = exactly(simd, self.mesh, asked, within, spot) else { return };
+                let best = nearer(self.mesh, asked, self.answers.hits[ray % RAYS], hit);
+                self.answers.hits[ray % RAYS] = Some(best);
+                self.answers.settled |= 1 << ray;
+                let (t, t_max) = (
+                    Limits::PLAIN.upper(best.lambda + best.error),
+                    &mut self.bundle.rays[ray / 8 % EIGHTS].t_max[ray % 8],
+                );
+                if t < *t_max {
+                    *t_max = t;
+                }
+            },
+        );
+    }
+
+    /// Settles what is remembered.
+    #[inline(always)]
+    fn settle<S: Simd>(&mut self, simd: S) {
+        let Nearests { low, spot, remembered, settled, .. } = self.answers;
+        let mut both = remembered & settled;
+        while both != 0 {
+            let ray = both.trailing_zeros() as usize % RAYS;
+            both &= both - 1;
+            if low[ray / 8][ray % 8] <= self.bundle.rays[ray / 8].t_max[ray % 8] {
+                self.confirm(simd, Spot::of(spot[ray / 8][ray % 8]), ray);
+            }
+        }
+        settle(simd, self.mesh, self.rays, remembered & !settled, spot.as_flattened(), self.answers.hits);
+    }
+}
+
+/// `false`, and nothing done, if the rays are no bundle.
+#[inline(always)]
+fn any_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mut [bool; RAYS]) -> bool {
+    // Rays to a light, from the light; t is then `max` − λ.
+    let mut bundle = Bundle::EMPTY;
+    let to_one_place = end_together(rays) && bundle.take(simd, mesh.frame(), rays, Start::End);
+    if !(to_one_place || bundle.take(simd, mesh.frame(), rays, Start::Origin)) {
+        return false;
+    }
+    *hits = [false; RAYS];
+    let mut walk = Walk::new(simd, mesh, rays, &mut bundle, Until { hits });
+    bvh::together(simd, &mesh.tree, &mut walk);
+    true
+}
+
+/// The search until all rays are known to hit something.
+struct Until<'a> {
+    hits: &'a mut [bool; RAYS],
+}
+
+impl<S: Simd> Answers<S> for Until<'_> {
+    #[inline(always)]
+    fn of_eight(walk: &mut Walk<Self>, simd: S, spot: Spot, eight: usize, rays: u32, verdict: &Verdict<S>) -> u32 {
+        let certain = certain(simd, &walk.bundle.rays[eight], verdict).to_bitmask() as u32;
+        let maybe = verdict.maybe & rays;
+        let (mut met, mut open) = (maybe & certain, maybe & !certain);
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize;
+            open &= open - 1;
+            if walk.meets(simd, spot, 8 * eight + lane) {
+                met |= 1 << lane;
+            }
+        }
+        let mut answered = met;
+        while answered != 0 {
+            let lane = answered.trailing_zeros() as usize;
+            answered &= answered - 1;
+            walk.end(8 * eight + lane);
+        }
+        met
+    }
+
+    #[inline(always)]
+    fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, [low, high]: [f32; 2]) -> bool {
+        let (eight, lane) = (&walk.bundle.rays[ray / 8], ray % 8);
+        let met = through & (low > eight.sure_min[lane]) & (high < eight.sure_max[lane]) || walk.meets(simd, spot, ray);
+        if met {
+            walk.end(ray);
+        }
+        met
+    }
+}
+
+impl Walk<'_, Until<'_>> {
+    #[inline(always)]
+    fn meets<S: Simd>(&self, simd: S, spot: Spot, ray: usize) -> bool {
+        let (ref asked, within) = self.rays[ray % RAYS];
+        occluded(simd, self.mesh, asked, within, &self.mesh.leaves[spot.leaf as usize], spot.lane as usize)
+    }
+
+    /// The ray has its answer.
+    #[inline(always)]
+    fn end(&mut self, ray: usize) {
+        self.answers.hits[ray % RAYS] = true;
+        self.bundle.end(ray);
     }
 }

@@ -5,8 +5,9 @@
 //! docs/numerics.md §10.
 
 use super::Mesh;
-use crate::bvh::{Bundle, E, LocalRay, PLAIN_ERROR};
-use fearless_simd::{Simd, f32x8, prelude::*};
+use crate::bvh::{Bundle, E, LocalRay};
+use crate::kernel::triangle::four;
+use fearless_simd::{Simd, f32x4, f32x8, f64x4, mask32x8, prelude::*};
 use glam::DVec3;
 
 /// Triangles have 29 bits for their number.
@@ -47,8 +48,81 @@ impl Leaf {
         }
         // Without a branch on the rotation, which nothing foretells.
         let first = 3 - (self.id[lane] >> ROTATION) as usize;
-        [first, first + 1, first + 2].map(|i| mesh.frame().world(column(&self.vertices[i % 3], lane)))
+        let vertex = |i: usize| mesh.frame().world(column(&self.vertices[i % 3], lane));
+        [vertex(first), vertex(first + 1), vertex(first + 2)]
     }
+}
+
+/// A triangle, by where it stands.
+#[derive(Clone, Copy)]
+pub(super) struct Spot {
+    pub(super) leaf: u32,
+    pub(super) lane: u32,
+}
+
+impl Spot {
+    /// No triangle: there are fewer leaves than triangles.
+    pub(super) const NOWHERE: u32 = u32::MAX;
+
+    #[inline(always)]
+    pub(super) fn packed(self) -> u32 {
+        self.leaf << 3 | self.lane
+    }
+
+    #[inline(always)]
+    pub(super) fn of(packed: u32) -> Self {
+        Self { leaf: packed >> 3, lane: packed & 7 }
+    }
+
+    #[inline(always)]
+    pub(super) fn number(self, mesh: &Mesh) -> u32 {
+        mesh.leaves[self.leaf as usize].number(self.lane as usize & 7)
+    }
+
+    #[inline(always)]
+    pub(super) fn vertices(self, mesh: &Mesh) -> [DVec3; 3] {
+        mesh.leaves[self.leaf as usize].vertices(self.lane as usize & 7, mesh)
+    }
+}
+
+/// The vertices of four triangles, each in a register of its own.
+#[inline(always)]
+pub(super) fn vertices_of_four<S: Simd>(simd: S, mesh: &Mesh, spots: [Spot; 4]) -> [four::Vectors<S>; 3] {
+    let [a, b, c, d] = spots;
+    if !mesh.exact {
+        let (a, b, c, d) = (a.vertices(mesh), b.vertices(mesh), c.vertices(mesh), d.vertices(mesh));
+        let vertex = |i: usize| four::vectors(simd, [a[i], b[i], c[i], d[i]]);
+        return [vertex(0), vertex(1), vertex(2)];
+    }
+    let leaf = |spot: Spot| (&mesh.leaves[spot.leaf as usize], spot.lane as usize & 7);
+    let (a, b, c, d) = (leaf(a), leaf(b), leaf(c), leaf(d));
+    let frame = mesh.frame();
+    let unscale = f64x4::splat(simd, frame.unscale);
+    let turn = |(leaf, lane): (&Leaf, usize)| (leaf.id[lane] >> ROTATION) as f32;
+    let turns = widened(simd, [turn(a), turn(b), turn(c), turn(d)]);
+    let (once, twice) = (turns.simd_eq(f64x4::splat(simd, 1.0)), turns.simd_eq(f64x4::splat(simd, 2.0)));
+    let mut axes = [[unscale; 3]; 3];
+    for (axis, turned) in axes.iter_mut().enumerate() {
+        let center = f64x4::splat(simd, frame.center[axis]);
+        let mut v = [unscale; 3];
+        for (i, v) in v.iter_mut().enumerate() {
+            let rows = [&a.0.vertices[i][axis], &b.0.vertices[i][axis], &c.0.vertices[i][axis], &d.0.vertices[i][axis]];
+            *v = widened(simd, [rows[0][a.1], rows[1][b.1], rows[2][c.1], rows[3][d.1]]) * unscale + center;
+        }
+        *turned = [
+            once.select(v[2], twice.select(v[1], v[0])),
+            once.select(v[0], twice.select(v[2], v[1])),
+            once.select(v[1], twice.select(v[0], v[2])),
+        ];
+    }
+    let [x, y, z] = axes;
+    [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]]
+}
+
+#[inline(always)]
+fn widened<S: Simd>(simd: S, x: [f32; 4]) -> f64x4<S> {
+    let x = f32x4::simd_from(simd, x);
+    x.combine(x).widen().0
 }
 
 /// The ray as the filter wants it: in f32, with the margins' constants.
@@ -120,16 +194,16 @@ impl Probe {
         let triangles = leaf.triangles(simd, self.exact);
         let (o, d) = (spread(simd, &self.origin), spread(simd, &self.direction));
         let (t_min, last) = (splat(simd, self.t_min), splat(simd, self.last(t_max)));
-        filter(simd, &triangles, [o, d], &self.margins, [t_min, last])
+        Some(filter(simd, &triangles, [o, d], &self.margins, [t_min, last])?.outcome())
     }
 }
 
 /// v₀, e₁, e₂ and the size of the triangle of each lane.
 pub(super) struct Triangles<S: Simd> {
-    v0: Vec8<S>,
-    e1: Vec8<S>,
-    e2: Vec8<S>,
-    size: f32x8<S>,
+    pub(super) v0: Vec8<S>,
+    pub(super) e1: Vec8<S>,
+    pub(super) e2: Vec8<S>,
+    pub(super) size: f32x8<S>,
 }
 
 impl Leaf {
@@ -151,51 +225,90 @@ pub(super) fn filter<S: Simd>(
     [o, d]: [Vec8<S>; 2],
     margins: &Margins,
     [t_min, last]: [f32x8<S>; 2],
-) -> Option<Outcome> {
+) -> Option<Verdict<S>> {
     let &Triangles { v0, e1, e2, size } = triangles;
     let c = minus(v0, o);
     let r = cross(c, d);
     let n = cross(e1, e2);
     let det = dot(n, d);
-    let u = dot(r, e2);
-    let v = -dot(r, e1);
-    let w = det - u - v;
-    let margin = margins.edges(simd, size);
-    // Certainly a miss: one edge function above zero, another below. An empty lane has a negative margin.
-    let least = u.min(v.min(w));
-    let most = u.max(v.max(w));
-    let outside = (least.simd_lt(-margin) & most.simd_gt(margin)).to_bitmask() as u32;
-    if outside == 0xff {
-        return None;
-    }
-    // Certainly through: all three above zero, or all below.
-    let through = least.simd_gt(margin) | most.simd_lt(-margin);
+    let sides = Sides::new([dot(r, e2), -dot(r, e1)], det, margins.edges(simd, size))?;
+    sides.verdict(simd, [dot(n, c), det], margins.depth(simd, size, c, n), [t_min, last])
+}
 
-    // The sign of det goes to t's numerator. Where it is uncertain the far margin is wide enough for both, and nothing is
-    // said to lie before t_min.
-    let t = dot(n, c);
-    let size_of_det = det.abs();
-    let signed = t * splat(simd, 1.0).copysign(det);
-    let (of_t, of_det) = margins.depth(simd, size, c, n);
-    let depth = of_det.mul_add(t_min.abs().max(last.abs()), of_t);
-    let beyond = (signed - size_of_det * last).simd_gt(depth);
-    let near = of_det.mul_add(t_min.abs(), of_t);
-    let before = (signed - size_of_det * t_min).simd_lt(-near) & size_of_det.simd_gt(of_det);
-    let maybe = !(outside | (beyond | before).to_bitmask() as u32) & 0xff;
-    if maybe == 0 {
-        return None;
+/// On which sides of the triangle's edges a line passes, as far as is certain.
+pub(super) struct Sides<S: Simd> {
+    outside: u32,
+    through: mask32x8<S>,
+}
+
+impl<S: Simd> Sides<S> {
+    /// From the edge functions and what they may be off by; `None` if all lines are certain to pass outside.
+    #[inline(always)]
+    pub(super) fn new([u, v]: [f32x8<S>; 2], det: f32x8<S>, margin: f32x8<S>) -> Option<Self> {
+        let w = det - u - v;
+        // Certainly a miss: one edge function above zero, another below. An empty lane has a negative margin.
+        let least = u.min(v.min(w));
+        let most = u.max(v.max(w));
+        let outside = (least.simd_lt(-margin) & most.simd_gt(margin)).to_bitmask() as u32;
+        if outside == 0xff {
+            return None;
+        }
+        // Certainly through: all three above zero, or all below.
+        Some(Self { outside, through: least.simd_gt(margin) | most.simd_lt(-margin) })
     }
-    // And the two roundings of each end.
-    let depth = signed.abs().mul_add(splat(simd, 4.0 * E), depth);
-    let (low, high) = ((signed - depth) / size_of_det, (signed + depth) / size_of_det);
-    let depths = Depths { low: low.into(), high: high.into() };
-    Some(Outcome { maybe, through: through.to_bitmask() as u32, depths })
+
+    /// What follows with t's numerator and denominator and what they may be off by; `None` if all are certain misses.
+    #[inline(always)]
+    pub(super) fn verdict(
+        self,
+        simd: S,
+        [t, det]: [f32x8<S>; 2],
+        (of_t, of_det): (f32x8<S>, f32x8<S>),
+        [t_min, last]: [f32x8<S>; 2],
+    ) -> Option<Verdict<S>> {
+        // The sign of det goes to t's numerator. Where it is uncertain the far margin is wide enough for both, and nothing is
+        // said to lie before t_min.
+        let size_of_det = det.abs();
+        let signed = t * splat(simd, 1.0).copysign(det);
+        let depth = of_det.mul_add(t_min.abs().max(last.abs()), of_t);
+        let beyond = (signed - size_of_det * last).simd_gt(depth);
+        let near = of_det.mul_add(t_min.abs(), of_t);
+        let before = (signed - size_of_det * t_min).simd_lt(-near) & size_of_det.simd_gt(of_det);
+        let maybe = !(self.outside | (beyond | before).to_bitmask() as u32) & 0xff;
+        if maybe == 0 {
+            return None;
+        }
+        // And the two roundings of each end.
+        let depth = signed.abs().mul_add(splat(simd, 4.0 * E), depth);
+        let (low, high) = ((signed - depth) / size_of_det, (signed + depth) / size_of_det);
+        Some(Verdict { maybe, through: self.through, low, high })
+    }
+}
+
+/// What is known of pairs of a line and a triangle, not all of which are certain misses.
+pub(super) struct Verdict<S: Simd> {
+    /// The lanes that are not certain to miss.
+    pub(super) maybe: u32,
+    /// The lanes whose lines pass through the insides of their triangles, for certain.
+    pub(super) through: mask32x8<S>,
+    /// t lies between these where the line certainly passes through; they mean nothing where it may not.
+    pub(super) low: f32x8<S>,
+    pub(super) high: f32x8<S>,
+}
+
+impl<S: Simd> Verdict<S> {
+    /// The same, lane by lane.
+    #[inline(always)]
+    pub(super) fn outcome(&self) -> Outcome {
+        let depths = Depths { low: self.low.into(), high: self.high.into() };
+        Outcome { maybe: self.maybe, through: self.through.to_bitmask() as u32, depths }
+    }
 }
 
 impl Margins {
     /// Of every ray of a bundle, and the t beyond which, either way, none has a hit.
     pub(super) fn of_bundle(bundle: &Bundle) -> (Self, f32) {
-        let steps = steps(bundle.size, PLAIN_ERROR);
+        let steps = steps(bundle.size, bundle.origin_error);
         (Self::new(steps, bundle.lengths[1]), steps / bundle.lengths[0])
     }
 
@@ -208,7 +321,7 @@ impl Margins {
     }
 
     #[inline(always)]
-    fn edges<S: Simd>(&self, simd: S, size: f32x8<S>) -> f32x8<S> {
+    pub(super) fn edges<S: Simd>(&self, simd: S, size: f32x8<S>) -> f32x8<S> {
         if UNCERTIFIED {
             return size.min(splat(simd, 0.0));
         }
@@ -217,7 +330,7 @@ impl Margins {
 
     /// What t's numerator n·c and its denominator may be off by.
     #[inline(always)]
-    fn depth<S: Simd>(&self, simd: S, size: f32x8<S>, c: Vec8<S>, n: Vec8<S>) -> (f32x8<S>, f32x8<S>) {
+    pub(super) fn depth<S: Simd>(&self, simd: S, size: f32x8<S>, c: Vec8<S>, n: Vec8<S>) -> (f32x8<S>, f32x8<S>) {
         if UNCERTIFIED {
             return (splat(simd, 0.0), splat(simd, 0.0));
         }
@@ -250,10 +363,10 @@ impl Depths {
     }
 }
 
-type Vec8<S> = [f32x8<S>; 3];
+pub(super) type Vec8<S> = [f32x8<S>; 3];
 
 #[inline(always)]
-fn splat<S: Simd>(simd: S, x: f32) -> f32x8<S> {
+pub(super) fn splat<S: Simd>(simd: S, x: f32) -> f32x8<S> {
     f32x8::splat(simd, x)
 }
 
@@ -263,18 +376,12 @@ fn spread<S: Simd>(simd: S, v: &[f32; 4]) -> Vec8<S> {
 }
 
 #[inline(always)]
-fn load<S: Simd>(simd: S, rows: &[[f32; 8]; 3]) -> Vec8<S> {
+pub(super) fn load<S: Simd>(simd: S, rows: &[[f32; 8]; 3]) -> Vec8<S> {
     [rows[0].simd_into(simd), rows[1].simd_into(simd), rows[2].simd_into(simd)]
 }
 
-/// One lane of each row, in every lane.
 #[inline(always)]
-pub(super) fn everywhere<S: Simd>(simd: S, rows: &[[f32; 8]; 3], lane: usize) -> Vec8<S> {
-    three(simd, [rows[0][lane & 7], rows[1][lane & 7], rows[2][lane & 7]])
-}
-
-#[inline(always)]
-fn three<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> Vec8<S> {
+pub(super) fn three<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> Vec8<S> {
     [splat(simd, x), splat(simd, y), splat(simd, z)]
 }
 
@@ -285,17 +392,17 @@ fn taxicab<S: Simd>(a: Vec8<S>) -> f32x8<S> {
 }
 
 #[inline(always)]
-fn minus<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
+pub(super) fn minus<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]
-fn dot<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> f32x8<S> {
+pub(super) fn dot<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> f32x8<S> {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
 #[inline(always)]
-fn cross<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
+pub(super) fn cross<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
     [a[1].mul_sub(b[2], a[2] * b[1]), a[2].mul_sub(b[0], a[0] * b[2]), a[0].mul_sub(b[1], a[1] * b[0])]
 }
 

@@ -8,6 +8,8 @@ mod build;
 mod each;
 mod leaf;
 mod query;
+mod seen;
+mod settle;
 
 use crate::bvh::{Frame, Level, Watch, Wide};
 use crate::kernel::triangle;

@@ -1,7 +1,7 @@
 //! Closest and any hit of a mesh.
 
 use super::Mesh;
-use super::leaf::{Leaf, Outcome, Probe, UNCERTIFIED};
+use super::leaf::{Leaf, Outcome, Probe, Spot, UNCERTIFIED};
 use crate::bvh::{self, Lanes, Limits, LocalRay, Sure};
 use crate::kernel::eft::{Fused, Split};
 use crate::kernel::{cpu, tally, textbook, triangle};
@@ -118,7 +118,7 @@ fn closest_of_all(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
 
 /// Whichever of two hits comes first: exactly, and by number where λ is the same.
 #[inline(always)]
-fn nearer(mesh: &Mesh, ray: &Ray, best: Option<Hit>, hit: Hit) -> Hit {
+pub(super) fn nearer(mesh: &Mesh, ray: &Ray, best: Option<Hit>, hit: Hit) -> Hit {
     let Some(old) = best else { return hit };
     let (gap, slack) = (hit.lambda - old.lambda, hit.error + old.error);
     // Rounding the two sums cannot make an overlap look like a gap of twice its size.
@@ -145,6 +145,13 @@ fn confirm<S: Simd>(simd: S, ray: &Ray, vertices: &[DVec3; 3], within: Interval)
     }
 }
 
+/// The ray's hit of a leaf's triangle.
+#[inline(always)]
+pub(super) fn exactly<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval, spot: Spot) -> Option<Hit> {
+    let hit = confirm(simd, ray, &spot.vertices(mesh), within)?;
+    Some(Hit { part: spot.number(mesh), ..hit })
+}
+
 /// A triangle that is certainly hit, at this t or later.
 #[derive(Clone, Copy)]
 struct Passed {
@@ -157,13 +164,13 @@ const MOST_PASSED: usize = 4;
 
 /// The search for the nearest hit. Triangles that the filter is certain of only shorten the ray; which of them is the
 /// nearest, and λ, is settled in f64 when the walk has ended and few are left.
-pub(super) struct Nearest<'a> {
+struct Nearest<'a> {
     mesh: &'a Mesh,
     ray: &'a Ray,
     within: Interval,
     limits: Limits,
     sure: Sure,
-    pub(super) t_max: f32,
+    t_max: f32,
     passed: [Passed; MOST_PASSED],
     count: usize,
     best: Option<Hit>,
@@ -171,18 +178,18 @@ pub(super) struct Nearest<'a> {
 
 impl<'a> Nearest<'a> {
     #[inline(always)]
-    pub(super) fn new(mesh: &'a Mesh, ray: &'a Ray, within: Interval, limits: Limits, sure: Sure, t_max: f32) -> Self {
+    fn new(mesh: &'a Mesh, ray: &'a Ray, within: Interval, limits: Limits, sure: Sure, t_max: f32) -> Self {
         let passed = [Passed { leaf: 0, lane: 0, t: 0.0 }; MOST_PASSED];
         Self { mesh, ray, within, limits, sure, t_max, passed, count: 0, best: None }
     }
 
     /// The answer.
     #[inline(always)]
-    pub(super) fn settle<S: Simd>(&mut self, simd: S, hit: &mut Option<Hit>) {
+    fn settle<S: Simd>(&mut self, simd: S, hit: &mut Option<Hit>) {
         if self.count == 1 && self.best.is_none() {
             // The rule.
             let Passed { leaf, lane, .. } = self.passed[0];
-            *hit = self.passed(simd, leaf, lane);
+            *hit = self.passed(simd, Spot { leaf, lane });
             return;
         }
         if self.count > 0 {
@@ -193,7 +200,7 @@ impl<'a> Nearest<'a> {
 
     /// Considers a triangle that may be met between the t of `depth`; `through`: whose inside the line certainly passes.
     #[inline(always)]
-    pub(super) fn consider<S: Simd>(&mut self, simd: S, [leaf, lane]: [u32; 2], through: bool, [low, high]: [f32; 2]) {
+    fn consider<S: Simd>(&mut self, simd: S, [leaf, lane]: [u32; 2], through: bool, [low, high]: [f32; 2]) {
         // Elsewhere the sign of the denominator is not known, and the depths mean nothing.
         if through && low > self.t_max {
             return;
@@ -222,32 +229,23 @@ impl<'a> Nearest<'a> {
         }
     }
 
-    /// The triangle's hit.
-    #[inline(always)]
-    fn exactly<S: Simd>(&self, simd: S, leaf: u32, lane: u32) -> Option<Hit> {
-        let leaf = &self.mesh.leaves[leaf as usize];
-        let vertices = leaf.vertices(lane as usize & 7, self.mesh);
-        let hit = confirm(simd, self.ray, &vertices, self.within)?;
-        Some(Hit { part: leaf.number(lane as usize & 7), ..hit })
-    }
-
     /// The hit of a triangle that is certainly hit.
     #[inline(always)]
-    fn passed<S: Simd>(&self, simd: S, leaf: u32, lane: u32) -> Option<Hit> {
-        let (number, leaf, lane) = (leaf, &self.mesh.leaves[leaf as usize], lane as usize & 7);
+    fn passed<S: Simd>(&self, simd: S, spot: Spot) -> Option<Hit> {
+        let (leaf, lane) = (&self.mesh.leaves[spot.leaf as usize], spot.lane as usize & 7);
         let vertices = leaf.vertices(lane, self.mesh);
         match triangle::passed(simd, self.ray, &vertices, leaf.has_plain_edges(lane)) {
             Some(hit) if !UNCERTIFIED => Some(Hit { part: leaf.number(lane), ..hit }),
-            _ => self.exactly_apart(simd, number, lane as u32),
+            _ => self.exactly_apart(simd, spot),
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn exactly_apart<S: Simd>(&self, simd: S, leaf: u32, lane: u32) -> Option<Hit> {
+    fn exactly_apart<S: Simd>(&self, simd: S, spot: Spot) -> Option<Hit> {
         simd.vectorize(
             #[inline(always)]
-            || self.exactly(simd, leaf, lane),
+            || exactly(simd, self.mesh, self.ray, self.within, spot),
         )
     }
 
@@ -256,7 +254,7 @@ impl<'a> Nearest<'a> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let Some(hit) = self.exactly(simd, leaf, lane) else { return };
+                let Some(hit) = exactly(simd, self.mesh, self.ray, self.within, Spot { leaf, lane }) else { return };
                 let best = nearer(self.mesh, self.ray, self.best, hit);
                 self.best = Some(best);
                 let t = self.limits.upper(best.lambda + best.error);
