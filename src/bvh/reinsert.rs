@@ -34,18 +34,15 @@ struct Move {
 
 /// Makes the tree cheaper in place; siblings stay in pairs.
 pub(super) fn reinsert(nodes: &mut [Node], watch: &Watch) {
-    watch.phase(0.8, SHARES.len());
-    if nodes.len() > 8 {
+    let count = nodes.len();
+    watch.phase(0.8, SHARES.iter().map(|share| count.div_ceil(*share)).sum());
+    if count > 8 {
         let mut tree = Tree::new(nodes);
         for share in SHARES {
-            if watch.stopped() {
+            let chosen = tree.count.div_ceil(share);
+            if tree.pass(chosen, watch) <= chosen / CONTENT || watch.stopped() {
                 return;
             }
-            let chosen = tree.count.div_ceil(share);
-            if tree.pass(chosen) <= chosen / CONTENT {
-                break;
-            }
-            watch.add(1);
         }
     }
 }
@@ -104,7 +101,7 @@ impl<'a> Tree<'a> {
     }
 
     /// How many of the `chosen` largest nodes have found a better place.
-    fn pass(&mut self, chosen: usize) -> usize {
+    fn pass(&mut self, chosen: usize, watch: &Watch) -> usize {
         let largest = self.largest(chosen);
         let mut found = 0;
         for step in largest.chunks((chosen / STEPS).max(FEW)) {
@@ -118,6 +115,10 @@ impl<'a> Tree<'a> {
             }
             for i in self.changed.drain(..) {
                 self.touched[i as usize] = false;
+            }
+            watch.add(step.len());
+            if watch.stopped() {
+                break;
             }
         }
         found
@@ -179,7 +180,7 @@ impl<'a> Tree<'a> {
         [m.to, m.from, m.from ^ 1, self.parent(m.to), self.parent(m.from)]
     }
 
-    /// Makes the move unless it meets an earlier one of the pass.
+    /// Makes the move unless it meets an earlier one of the step.
     fn make(&mut self, m: &Move) {
         let &Move { from, to, .. } = m;
         let changed = self.changed_by(m);
@@ -211,11 +212,15 @@ impl<'a> Tree<'a> {
         self.refit(parent);
     }
 
+    /// Too deep if earlier moves have taken its new place below it: in exact arithmetic no two moves that both gain could.
     fn depth_after(&self, m: &Move) -> u32 {
         let (mut depth, mut at) = (1, m.to);
         while at != 0 {
             at = self.parent(at);
             depth += 1;
+            if at == m.from {
+                return u32::MAX;
+            }
         }
         depth + u32::from(self.heights[m.from as usize].max(self.heights[m.to as usize]))
     }

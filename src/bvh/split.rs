@@ -84,8 +84,8 @@ impl<S: Simd> Side<S> {
     #[inline(always)]
     fn cost(&self, leaf: u32) -> f32x4<S> {
         let [a, b, c] = [sides(self.bounds[0]), sides(self.bounds[1]), sides(self.bounds[2])];
-        let (ac, b_) = (a.interleave(c), b.interleave(b));
-        let (x, y, z) = (ac.0.zip_low(b_.0), ac.0.zip_high(b_.0), ac.1.zip_low(b_.1));
+        let (ac, bb) = (a.interleave(c), b.interleave(b));
+        let (x, y, z) = (ac.0.zip_low(bb.0), ac.0.zip_high(bb.0), ac.1.zip_low(bb.1));
         let area = x * y + y * z + z * x;
         let leaves = (self.count + i32x4::splat(self.simd, (1 << leaf) - 1)) >> leaf;
         area * f32x4::float_from(leaves)

@@ -1,6 +1,6 @@
 //! The tree over a mesh's triangles, and its leaves.
 
-use super::leaf::{Leaf, PLAIN, ROTATION};
+use super::leaf::{Leaf, PLAIN, ROTATION, Vec8, load, minus};
 use crate::Aabb;
 use crate::bvh::{self, E, Frame, FrameBox, Level, Wide};
 use crate::kernel::float::power;
@@ -150,18 +150,6 @@ fn is_short<S: Simd>(simd: S, vertices: [[f32x8<S>; 3]; 3]) -> mask32x8<S> {
     !long
 }
 
-type Vec8<S> = [f32x8<S>; 3];
-
-#[inline(always)]
-fn load<S: Simd>(simd: S, rows: &[[f32; 8]; 3]) -> Vec8<S> {
-    [rows[0].simd_into(simd), rows[1].simd_into(simd), rows[2].simd_into(simd)]
-}
-
-#[inline(always)]
-fn minus<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
 #[inline(always)]
 fn square<S: Simd>(a: Vec8<S>) -> f32x8<S> {
     a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
@@ -174,7 +162,7 @@ mod tests {
     use crate::kernel::triangle::has_plain_edges;
     use glam::DVec3;
 
-    /// From coordinates of all sizes, near the origin and far from it, and mirrored ones that ought to be zero.
+    /// From coordinates of all sizes, near the origin and far from it.
     #[test]
     fn leaves_know_plain_edges() {
         let mut random = Random::new(3);

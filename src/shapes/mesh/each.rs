@@ -119,7 +119,9 @@ impl<'a, A> Walk<'a, A> {
     {
         let triangles = self.mesh.leaves[number as usize].triangles(simd, self.mesh.exact);
         let seen = Seen::new(simd, &triangles, view, &self.margins);
-        if rays.count_ones() <= FEW {
+        let mut lanes = if rays.count_ones() <= FEW { 0xff } else { seen.lanes(simd, view) };
+        let eights = (0..EIGHTS).filter(|eight| rays >> (8 * eight) & 0xff != 0).count() as u32;
+        if rays.count_ones() <= lanes.count_ones() * eights {
             while rays != 0 {
                 let ray = rays.trailing_zeros() as usize % RAYS;
                 rays &= rays - 1;
@@ -129,7 +131,6 @@ impl<'a, A> Walk<'a, A> {
             }
             return;
         }
-        let mut lanes = seen.lanes(simd, view);
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
