@@ -249,7 +249,7 @@ impl Bundle {
         origin_error: 0.0,
     };
 
-    /// Makes these rays the bundle's, which was [`EMPTY`](Self::EMPTY) or refused others. `false` if the rays go very different ways, if one of
+    /// Makes these rays the bundle's, instead of all others. `false`, and no use, if the rays go very different ways, if one of
     /// them is not taken as it is by [`LocalRay::new`](super::LocalRay::new), or if an interval is empty; from the end,
     /// if that is not one place.
     #[inline(always)]
@@ -260,6 +260,9 @@ impl Bundle {
         rays: &[(Ray, Interval); RAYS],
         from: Start,
     ) -> bool {
+        (self.away, self.mixed) = (0, false);
+        (self.near_origin, self.far_origin) = ([FAR; 3], [-FAR; 3]);
+        self.inverse = [[1.0; 3]; 2];
         // No closures over vectors here and below: one that is not inlined makes calls of all that it does.
         let (eights, _) = rays.as_chunks::<8>();
         let zero = f32x8::splat(simd, 0.0);

@@ -15,20 +15,22 @@ pub(super) type Stretch = (Ray, Interval);
 
 /// `hits[i]` becomes the nearest hit of `rays[i]`.
 pub(super) fn closest(mesh: &Mesh, rays: &[Stretch], hits: &mut [Option<Hit>]) {
+    let mut bundle = Bundle::EMPTY;
     each(
         rays,
         hits,
-        |rays, hits| dispatch!(mesh.level.token(), simd => closest_with(simd, mesh, rays, hits)),
+        |rays, hits| dispatch!(mesh.level.token(), simd => closest_with(simd, mesh, rays, &mut bundle, hits)),
         |(ray, within)| query::closest(mesh, ray, *within),
     );
 }
 
 /// `hits[i]` becomes whether `rays[i]` hits anything.
 pub(super) fn any(mesh: &Mesh, rays: &[Stretch], hits: &mut [bool]) {
+    let mut bundle = Bundle::EMPTY;
     each(
         rays,
         hits,
-        |rays, hits| dispatch!(mesh.level.token(), simd => any_with(simd, mesh, rays, hits)),
+        |rays, hits| dispatch!(mesh.level.token(), simd => any_with(simd, mesh, rays, &mut bundle, hits)),
         |(ray, within)| query::any(mesh, ray, *within),
     );
 }
@@ -38,7 +40,7 @@ pub(super) fn any(mesh: &Mesh, rays: &[Stretch], hits: &mut [bool]) {
 fn each<T>(
     rays: &[Stretch],
     hits: &mut [T],
-    together: impl Fn(&[Stretch; RAYS], &mut [T; RAYS]) -> bool,
+    mut together: impl FnMut(&[Stretch; RAYS], &mut [T; RAYS]) -> bool,
     alone: impl Fn(&Stretch) -> T,
 ) {
     const MOST_PATIENT: u32 = 64;
@@ -217,8 +219,13 @@ fn certain<S: Simd>(simd: S, eight: &bvh::Eight, verdict: &Verdict<S>) -> mask32
 
 /// `false`, and nothing done, if the rays are no bundle.
 #[inline(always)]
-fn closest_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mut [Option<Hit>; RAYS]) -> bool {
-    let mut bundle = Bundle::EMPTY;
+fn closest_with<S: Simd>(
+    simd: S,
+    mesh: &Mesh,
+    rays: &[Stretch; RAYS],
+    bundle: &mut Bundle,
+    hits: &mut [Option<Hit>; RAYS],
+) -> bool {
     if !bundle.take(simd, mesh.frame(), rays, Start::Origin) {
         return false;
     }
@@ -230,7 +237,7 @@ fn closest_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mu
         settled: 0,
         hits,
     };
-    let mut walk = Walk::new(simd, mesh, rays, &mut bundle, nearests);
+    let mut walk = Walk::new(simd, mesh, rays, bundle, nearests);
     bvh::together(simd, &mesh.tree, &mut walk);
     walk.settle(simd);
     true
@@ -334,15 +341,20 @@ impl Walk<'_, Nearests<'_>> {
 
 /// `false`, and nothing done, if the rays are no bundle.
 #[inline(always)]
-fn any_with<S: Simd>(simd: S, mesh: &Mesh, rays: &[Stretch; RAYS], hits: &mut [bool; RAYS]) -> bool {
+fn any_with<S: Simd>(
+    simd: S,
+    mesh: &Mesh,
+    rays: &[Stretch; RAYS],
+    bundle: &mut Bundle,
+    hits: &mut [bool; RAYS],
+) -> bool {
     // Rays to a light, from the light; t is then `max` − λ.
-    let mut bundle = Bundle::EMPTY;
     let to_one_place = end_together(rays) && bundle.take(simd, mesh.frame(), rays, Start::End);
     if !(to_one_place || bundle.take(simd, mesh.frame(), rays, Start::Origin)) {
         return false;
     }
     *hits = [false; RAYS];
-    let mut walk = Walk::new(simd, mesh, rays, &mut bundle, Until { hits });
+    let mut walk = Walk::new(simd, mesh, rays, bundle, Until { hits });
     bvh::together(simd, &mesh.tree, &mut walk);
     true
 }
