@@ -190,6 +190,53 @@ fn slices_are_answered_as_their_rays_are() {
     assert!(hits_in_all > rays_in_all / 2);
 }
 
+/// Rays that start, or end, next to one point of a surface, but for the spread that still counts as one place: what a leaf seen from there
+/// may be off by decides which side of it they start on.
+#[test]
+fn slices_from_a_surface_are_answered_as_their_rays_are() {
+    let mut random = Rng::new(5);
+    let (mut rays_in_all, mut hits_in_all) = (0, 0);
+    let far = moved(icosphere(3), 1e-3, DVec3::new(1e5, 2e5, -3e5));
+    for (positions, triangles) in [icosphere(2), icosphere(4), grid_cube(5), soup(&mut Rng::new(3), 300, 0.3), far] {
+        let mut mesh = Mesh::new(positions, triangles).unwrap();
+        let size = mesh.bounds().size().max_element();
+        for round in 0..300 {
+            let [a, b, c] = mesh.vertices(random.index(mesh.triangles().len()) as u32);
+            let place = [a, a + random.fraction() * (b - a), 0.3 * a + 0.3 * b + 0.4 * c][round % 3];
+            let spread = size * [0.0, 1e-14, 1e-8, 6e-8, 1.2e-7, 2.4e-7, 3.5e-7][random.index(7)];
+            let (way, step) = (size * random.unit(), 0.2 * random.fraction());
+            let rays: Vec<(Ray, Interval)> = (0..64)
+                .map(|_| {
+                    let p = place + spread * random.in_cube(1.0);
+                    let d = way + way.length() * step * random.in_cube(1.0);
+                    match round % 5 {
+                        0 => (Ray::new(p, d), Interval::FORWARD),
+                        1 => (Ray::new(p, d), Interval::new(-1e-7, 1e-7)),
+                        2 => (Ray::new(p - d, d), Interval::new(0.0, 1.0)),
+                        3 => (Ray::new(p - d, d), Interval::new(0.9, 1.0 + 1e-7)),
+                        _ => (Ray::new(p - d, 8.0 * d), Interval::new(-5.0, 0.125)),
+                    }
+                })
+                .collect();
+            let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
+            for (level, simd) in Level::all() {
+                mesh.set_level(simd);
+                mesh.intersect_each(&rays, &mut hits);
+                mesh.occludes_each(&rays, &mut occluded);
+                for (i, (ray, within)) in rays.iter().enumerate() {
+                    let alone = mesh.intersect(ray, *within);
+                    assert_eq!(hits[i], alone, "{level}: ray {i}, {ray:?} {within:?}");
+                    assert_eq!(occluded[i], alone.is_some(), "{level}: ray {i}, {ray:?} {within:?}");
+                }
+            }
+            rays_in_all += rays.len();
+            hits_in_all += hits.iter().flatten().count();
+        }
+    }
+    println!("{rays_in_all} rays at one place of a surface, {hits_in_all} hits, 0 differences");
+    assert!(hits_in_all > rays_in_all / 4);
+}
+
 /// From a point inside of closed meshes to vertices, points of edges and of faces, and from behind these back to that point.
 #[test]
 fn slices_do_not_leak() {

@@ -20,7 +20,7 @@ pub(crate) const EIGHTS: usize = RAYS / 8;
 /// none of their rays meets.
 const WIDEST: f32 = 1.0 / 8.0;
 
-/// Rays from one place share more.
+/// Rays from one place share more. The margin of the test of all directions at once is for no more than this: docs/numerics.md §10.
 const WIDEST_FROM_ONE_PLACE: f32 = 0.5;
 
 /// Slopes steeper than this, against the direction's longest coordinate, have inverses that bound nothing: such an axis is left
@@ -36,8 +36,11 @@ const FAR: f32 = 1e30;
 /// Ends that are farther apart than this, in roundings of 1 + the largest coordinate, are not one place.
 const ONE_PLACE: f32 = 8.0 * E;
 
-/// No place that rays end at is farther from where they start, nor from the tree.
-const BACK: [f32; 2] = [16.0, 8.0];
+/// No place that rays end at is farther from where they start.
+const FARTHEST_WAY: f32 = 16.0;
+
+/// And none is farther from the tree.
+const FARTHEST_END: f32 = 8.0;
 
 /// As [`PLAIN_ERROR`], of the end of a ray: 48u are needed.
 const BACK_ERROR: f32 = 4.0 * PLAIN_ERROR;
@@ -301,10 +304,11 @@ impl Bundle {
         let alike = (spread <= widest) & (turn <= widest * self.lengths[0]);
         let (farthest, shortest, error) = match from {
             Start::Origin => (NEAR, LENGTHS[0], PLAIN_ERROR),
-            Start::End => (BACK[1], 2.0 * LENGTHS[0], BACK_ERROR),
+            // Twice as far, half as short: no t is longer than from an origin.
+            Start::End => (FARTHEST_END, 2.0 * LENGTHS[0], BACK_ERROR),
         };
         let plain = (size <= farthest) & (self.lengths[0] >= shortest) & (self.lengths[1] <= LENGTHS[1]);
-        let ends = (from == Start::Origin) || one_place & (range(ways)[1] <= BACK[0]);
+        let ends = (from == Start::Origin) || one_place & (range(ways)[1] <= FARTHEST_WAY);
         if !(long & plain & alike & ends & sum.reduce_sum().is_finite()) {
             return false;
         }

@@ -111,7 +111,8 @@ impl Corners<'_> {
             self.edges(&mut leaf, numbers);
             square(load(simd, &leaf.vertices[1])).sqrt() + square(load(simd, &leaf.vertices[2])).sqrt()
         };
-        // Differences, squares, sums, roots, the last sum and these two: less than 8 roundings; and squares that underflow.
+        // Differences, squares, sums, roots, the last sum and these two: less than 8 roundings; and squares that underflow, here
+        // and in the filter, which relies on it (docs/numerics.md §10).
         let size = lengths * f32x8::splat(simd, 1.0 + 16.0 * E) + f32x8::splat(simd, 2e-22);
         let most: f32x8<S> = most.simd_into(simd);
         leaf.size = size.min(most).into();

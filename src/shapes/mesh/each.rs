@@ -66,7 +66,7 @@ fn each<T>(
     }
 }
 
-/// A first look that costs next to nothing: whether a few directions are alike. [`Bundle::new`] looks at all.
+/// A first look that costs next to nothing: whether a few directions are alike. [`Bundle::take`] looks at all.
 fn go_together(rays: &[Stretch; RAYS]) -> bool {
     let first = rays[0].0.direction;
     let close = 0.5 * first.abs().max_element();
@@ -259,7 +259,7 @@ struct Nearests<'a> {
 
 impl<S: Simd> Answers<S> for Nearests<'_> {
     #[inline(always)]
-    fn of_eight(walk: &mut Walk<Self>, simd: S, spot: Spot, eight: usize, _: u32, verdict: &Verdict<S>) -> u32 {
+    fn of_eight(walk: &mut Walk<Self>, simd: S, spot: Spot, eight: usize, asked: u32, verdict: &Verdict<S>) -> u32 {
         let rays = &mut walk.bundle.rays[eight];
         let [low, t_max]: [f32x8<S>; 2] = [walk.answers.low[eight].simd_into(simd), rays.t_max.simd_into(simd)];
         let nearer = certain(simd, rays, verdict) & verdict.high.simd_lt(low);
@@ -269,7 +269,7 @@ impl<S: Simd> Answers<S> for Nearests<'_> {
         walk.answers.low[eight] = nearer.select(verdict.low, low).into();
         rays.t_max = nearer.select(verdict.high.min(t_max), t_max).into();
         walk.answers.remembered |= (nearer.to_bitmask() as u32) << (8 * eight);
-        let mut open = verdict.maybe & !((nearer | farther).to_bitmask() as u32);
+        let mut open = verdict.maybe & asked & !((nearer | farther).to_bitmask() as u32);
         while open != 0 {
             let lane = open.trailing_zeros() as usize;
             open &= open - 1;

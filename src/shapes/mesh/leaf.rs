@@ -163,9 +163,9 @@ pub(super) const UNCERTIFIED: bool = cfg!(truehit_uncertified);
 /// What underflow may add to an edge function.
 const UNDERFLOW: f32 = 1e-36;
 
-/// And to t's numerator, against its denominator times a limit of t: that is up to 5·2⁴⁰, and multiplies what the
+/// And to t's numerator, against its denominator times a limit of t: that is up to 45·2⁴⁰, and multiplies what the
 /// denominator lost.
-const DEPTH_UNDERFLOW: f32 = 1e-31;
+const DEPTH_UNDERFLOW: f32 = 1e-30;
 
 impl Probe {
     #[inline(always)]
