@@ -84,7 +84,8 @@ fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3;
 }
 
 /// The hit of a ray that a mesh's filter has proved to meet the triangle at a λ that counts, to the bit as [`intersect_with`] has it; `None` where
-/// that would leave its fast path. That the edge functions would satisfy it follows from the filter's margins and [`WEIGHT`]: docs/numerics.md §4. `plain`: b − a and c − a are vectors of floats. For code that was dispatched to the instructions of `simd`.
+/// that would leave its fast path. That the edge functions would satisfy it follows from the margins of the filter and of this file:
+/// docs/numerics.md §4. `plain`: b − a and c − a are vectors of floats. For code that was dispatched to the instructions of `simd`.
 #[inline(always)]
 #[must_use]
 pub fn passed<S: Simd>(simd: S, ray: &Ray, vertices: &[DVec3; 3], plain: bool) -> Option<Hit> {
