@@ -1,11 +1,11 @@
 //! A shape seen through an affine map.
 
 use crate::kernel::bound::{INFLATE, U};
-use crate::kernel::eft::{Split, two_diff, two_sum};
+use crate::kernel::eft::{two_diff, two_sum};
 use crate::kernel::float::{exponent_of, ldexp, power, unit};
-use crate::kernel::map::{Image, Map, Unusable, inverse, sum, taxicab};
+use crate::kernel::map::{Image, Map, Unusable, inverse, taxicab, transform_point};
 use crate::kernel::tally;
-use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
+use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint, Tangent};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 /// `shape` moved, turned, scaled, mirrored or sheared by an affine map.
@@ -122,15 +122,6 @@ fn largest_stretch(m: &DMat3) -> f64 {
 /// of the direction, unless the ray grazes by less than its inverse: how far outside the interval hits are looked for.
 const REACH: f64 = power(20);
 
-/// How far λ near `limit` may move.
-fn reach(image: &Image, limit: f64) -> f64 {
-    let origin = taxicab(image.origin_low) + image.origin_error;
-    let direction = taxicab(image.direction_low) + image.direction_error;
-    let by = REACH * (origin + limit.abs() * direction) / image.ray.direction.abs().max_element();
-    // An infinite limit stays where it is.
-    if by.is_finite() { by } else { 0.0 }
-}
-
 impl<S: Shape> Affine<S> {
     #[inline]
     fn innermost(&self) -> &dyn Shape {
@@ -149,6 +140,15 @@ impl<S: Shape> Affine<S> {
     /// Mᵀn.
     fn across(&self, object_normal: DVec3) -> DVec3 {
         self.innermost_from_world.leading().matrix3.transpose() * object_normal
+    }
+
+    /// κ‖M‖²/|Mᵀn|, in an order that stays in range: how far a surface of curvature κ is bent here, where |Mᵀn| is `shrunk`.
+    fn curved(&self, curvature: f64, shrunk: f64) -> f64 {
+        if curvature == 0.0 {
+            return 0.0;
+        }
+        let norm = self.norm();
+        curvature * norm * (norm / shrunk)
     }
 
     /// Mᵀn, a unit vector.
@@ -174,17 +174,18 @@ impl<S: Shape> Affine<S> {
         if e_size == 0.0 && unknown == 0.0 {
             return (0.0, 0.0);
         }
-        let n = shape.normal(ray, hit);
-        let curvature = shape.curvature(ray, hit);
-        let normal_error = shape.normal_error(ray, hit) + curvature * (hit.error * size + e_size + unknown);
+        let Tangent { normal: n, normal_error, curvature } = shape.tangent(ray, hit);
+        let normal_error = normal_error + curvature * (hit.error * size + e_size + unknown);
         let slope = n.dot(ray.direction) + n.dot(image.direction_low);
         // Three products, three sums, and products that vanish.
         let slope_error = (normal_error + 5.0 * U) * size + image.direction_error + f64::from_bits(8);
         let least_slope = slope.abs() - slope_error;
+        // Beside the next division, not after it.
+        let steepness = 1.0 / least_slope;
         let shift = -n.dot(e) / slope;
-        let first = (unknown + (normal_error + 4.0 * U) * e_size + shift.abs() * slope_error) / least_slope;
+        let first = (unknown + (normal_error + 4.0 * U) * e_size + shift.abs() * slope_error) * steepness;
         let moved = e_size + unknown + (shift.abs() + first) * size;
-        let bend = 1.3 * (curvature * moved) * moved / least_slope;
+        let bend = 1.3 * (curvature * moved) * moved * steepness;
         let error = (first + bend) * INFLATE;
         let sound = slope.abs() >= 2.0 * slope_error
             && curvature * moved * size <= 0.3 * least_slope
@@ -281,8 +282,17 @@ fn past(hit: &Hit, zone: Interval) -> f64 {
 }
 
 /// `within`, and as much on either side of it as λ may move.
+#[inline(always)]
 fn widened(image: &Image, within: Interval) -> Interval {
-    Interval { min: within.min - reach(image, within.min), max: within.max + reach(image, within.max) }
+    let origin = taxicab(image.origin_low) + image.origin_error;
+    let direction = taxicab(image.direction_low) + image.direction_error;
+    let scale = REACH / image.ray.direction.abs().max_element();
+    // An infinite limit stays where it is.
+    let reach = |limit: f64| {
+        let by = scale * (origin + limit.abs() * direction);
+        if by.is_finite() { by } else { 0.0 }
+    };
+    Interval { min: within.min - reach(within.min), max: within.max + reach(within.max) }
 }
 
 impl<S: Shape> Shape for Affine<S> {
@@ -327,17 +337,18 @@ impl<S: Shape> Shape for Affine<S> {
     fn point(&self, world_ray: &Ray, hit: &Hit) -> SurfacePoint {
         let object_ray = self.object_ray(world_ray);
         let SurfacePoint { position, error } = self.innermost().point(&object_ray, hit);
+        let world = transform_point(&self.world_from_innermost, position);
         let (w, t) = (self.world_from_innermost.matrix3, self.world_from_innermost.translation);
-        let row = |i: usize| sum::<Split>([w.x_axis[i], w.y_axis[i], w.z_axis[i]], position, t[i], 0.0);
-        let world = DVec3::new(row(0).0, row(1).0, row(2).0);
         // The map's entries are rounded, and so is the sum.
         let size =
             w.x_axis.abs() * position.x.abs() + w.y_axis.abs() * position.y.abs() + w.z_axis.abs() * position.z.abs();
         let rounding = U * (taxicab(world) + 2.0 * taxicab(size + t.abs()));
         // An object-space error ε is at most ‖W‖ε here; along the normal, where it lies, it is ε/|Mᵀn|.
         let stretched = error * largest_stretch(&self.world_from_innermost.matrix3);
-        let across = 1.01 * error / self.across(self.innermost().normal(&object_ray, hit)).length();
-        let bends = self.curvature(world_ray, hit) * across;
+        let Tangent { normal, curvature, .. } = self.innermost().tangent(&object_ray, hit);
+        let shrunk = self.across(normal).length();
+        let across = 1.01 * error / shrunk;
+        let bends = self.curved(curvature, shrunk) * across;
         let off = if bends < 0.005 && across < stretched { across } else { stretched };
         SurfacePoint { position: world, error: (off + rounding) * INFLATE }
     }
@@ -348,7 +359,7 @@ impl<S: Shape> Shape for Affine<S> {
             return false;
         }
         // Behind the rounded image's origin, and before the exact one's? Only what was left may be there.
-        let mut zone = Interval { min: -reach(&image, 0.0), max: f64::from_bits(1) };
+        let mut zone = Interval { max: f64::from_bits(1), ..widened(&image, Interval::FORWARD) };
         while let Some(behind) = self.innermost().intersect(&image.ray, zone) {
             let left = matches!(self.place(&image, &behind, Interval::FORWARD, zone.min), Place::Before);
             if !left && behind.part == hit.part {
@@ -359,24 +370,13 @@ impl<S: Shape> Shape for Affine<S> {
         true
     }
 
-    fn curvature(&self, world_ray: &Ray, hit: &Hit) -> f64 {
-        let object_ray = self.object_ray(world_ray);
-        let curvature = self.innermost().curvature(&object_ray, hit);
-        if curvature == 0.0 {
-            return 0.0;
-        }
-        let across = self.across(self.innermost().normal(&object_ray, hit)).length();
-        // κ‖M‖²/|Mᵀn|, in an order that stays in range.
-        let norm = self.norm();
-        curvature * norm * (norm / across)
-    }
-
-    fn normal_error(&self, world_ray: &Ray, hit: &Hit) -> f64 {
-        let object_ray = self.object_ray(world_ray);
-        let across = self.across(self.innermost().normal(&object_ray, hit)).length();
+    fn tangent(&self, world_ray: &Ray, hit: &Hit) -> Tangent {
+        let Tangent { normal, normal_error, curvature } = self.innermost().tangent(&self.object_ray(world_ray), hit);
+        let shrunk = self.across(normal).length();
         // |δ(Mᵀn)| ≤ ‖M‖(|δn| + a few u); of it only what is across Mᵀn turns the unit vector.
-        let error = self.innermost().normal_error(&object_ray, hit) + 8.0 * U;
-        1.01 * error * (self.norm() / across) + 8.0 * U
+        let turned = 1.01 * (normal_error + 8.0 * U) * (self.norm() / shrunk);
+        let curvature = self.curved(curvature, shrunk);
+        Tangent { normal: self.world_normal(normal), normal_error: turned + 8.0 * U, curvature }
     }
 
     fn precise_lambda(&self, world_ray: &Ray, hit: &Hit) -> [f64; 2] {

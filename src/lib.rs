@@ -72,7 +72,7 @@ pub use interval::Interval;
 pub use raster::Raster;
 pub use ray::Ray;
 pub use scene::{Scene, SceneBuilder, SceneHit};
-pub use shape::{Shape, SurfacePoint};
+pub use shape::{Shape, SurfacePoint, Tangent};
 pub use shapes::{Cone, Cylinder, Mesh, Patch, Plane, Polygon, Sphere, Triangle};
 pub use surface::Surface;
 

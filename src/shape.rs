@@ -70,18 +70,10 @@ pub trait Shape: Debug + Send + Sync {
         true
     }
 
-    /// An upper bound of the surface's normal curvature (1/radius) near `hit`; zero for flat shapes, which is the
-    /// default. [`Affine`](crate::Affine) bounds by it how far λ moves when a ray is rounded.
-    fn curvature(&self, ray: &Ray, hit: &Hit) -> f64 {
-        let _ = (ray, hit);
-        0.0
-    }
-
-    /// How far off the vector [`normal`](Self::normal) may be, λ's own error aside. The default, a few units in the last
-    /// place, is what the shapes of this crate keep; [`Affine`](crate::Affine) asks.
-    fn normal_error(&self, ray: &Ray, hit: &Hit) -> f64 {
-        let _ = (ray, hit);
-        8.0 * f64::EPSILON
+    /// The surface around `hit`, for who moves it a little: [`Affine`](crate::Affine) finds by it how far λ moves when a ray's
+    /// image is rounded. The default is a flat shape's, with a normal that is off by a few units in the last place.
+    fn tangent(&self, ray: &Ray, hit: &Hit) -> Tangent {
+        Tangent { normal: self.normal(ray, hit), normal_error: 8.0 * f64::EPSILON, curvature: 0.0 }
     }
 
     /// The shape and the map, if this is another shape seen through an affine map (from the world to its frame): a chain of
@@ -106,6 +98,17 @@ pub struct SurfacePoint {
     /// `position` is at most this far from the surface. Along the surface it is off the exact hit by at most the hit's
     /// `error` times the length of the ray's direction, plus a few units in the last place of the coordinates.
     pub error: f64,
+}
+
+/// A surface around a hit: its tangent plane, and how fast it leaves that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tangent {
+    /// What [`Shape::normal`] gives: a unit vector.
+    pub normal: DVec3,
+    /// How far off that vector may be, λ's own error aside.
+    pub normal_error: f64,
+    /// An upper bound of the normal curvature (1/radius) near the hit; zero for flat shapes.
+    pub curvature: f64,
 }
 
 macro_rules! forward_shape {
@@ -138,11 +141,8 @@ macro_rules! forward_shape {
             fn departs(&self, ray: &Ray, hit: &Hit, outward: bool) -> bool {
                 (**self).departs(ray, hit, outward)
             }
-            fn curvature(&self, ray: &Ray, hit: &Hit) -> f64 {
-                (**self).curvature(ray, hit)
-            }
-            fn normal_error(&self, ray: &Ray, hit: &Hit) -> f64 {
-                (**self).normal_error(ray, hit)
+            fn tangent(&self, ray: &Ray, hit: &Hit) -> Tangent {
+                (**self).tangent(ray, hit)
             }
             fn seen_through(&self) -> Option<(&dyn Shape, &Map)> {
                 (**self).seen_through()

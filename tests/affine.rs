@@ -10,7 +10,7 @@ use support::oracle::{Line, innermost, solid, truth};
 use support::rng::Rng;
 use support::shapes::{as_stored, object_ray, shape};
 use truehit::glam::{DAffine3, DMat3, DQuat, DVec3};
-use truehit::{Aabb, Affine, Hit, Interval, Ray, Shape, Sphere};
+use truehit::{Aabb, Affine, Hit, Interval, Ray, Shape, Sphere, Tangent};
 
 fn family(number: u32) -> Family {
     families::all().into_iter().find(|f| f.kernel == Kernel::Affine && f.number == number).unwrap()
@@ -124,8 +124,9 @@ impl Shape for Counted {
     fn bounds(&self) -> Aabb {
         Sphere::UNIT.bounds()
     }
-    fn curvature(&self, ray: &Ray, hit: &Hit) -> f64 {
-        Sphere::UNIT.curvature(ray, hit)
+    fn tangent(&self, ray: &Ray, hit: &Hit) -> Tangent {
+        self.normals.fetch_add(1, Ordering::Relaxed);
+        Sphere::UNIT.tangent(ray, hit)
     }
 }
 

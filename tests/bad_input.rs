@@ -304,7 +304,7 @@ fn ask_everything(s: &dyn Shape, ray: &Ray, hit: &Hit, direction: DVec3) {
     let n = s.normal(ray, hit);
     assert!((n.length() - 1.0).abs() < 1e-9, "{s:?} {ray:?} {hit:?}: normal {n}");
     let _ = (s.bounds(), s.shading_normal(ray, hit), s.texture_coordinates(ray, hit), s.precise_lambda(ray, hit));
-    let _ = (s.curvature(ray, hit), s.point(ray, hit));
+    let _ = (s.tangent(ray, hit), s.point(ray, hit));
     let surface = Surface::new(s, ray, hit);
     let _ = (surface.spawn(direction), surface.spawn_to(direction));
 }

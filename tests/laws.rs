@@ -13,7 +13,7 @@ use support::rng::Rng;
 use support::shapes::shape;
 use truehit::glam::{DAffine3, DMat3, DVec2, DVec3};
 use truehit::kernel::map::Map;
-use truehit::{Aabb, Affine, Hit, Interval, Ray, Shape, SurfacePoint};
+use truehit::{Aabb, Affine, Hit, Interval, Ray, Shape, SurfacePoint, Tangent};
 
 /// Runs `law` on `cases` random cases of all families whose solid is a shape; half of them ordinary rays. At least a
 /// third must hit.
@@ -279,17 +279,14 @@ impl Shape for Probe {
     fn departs(&self, _: &Ray, _: &Hit, _: bool) -> bool {
         false
     }
-    fn curvature(&self, _: &Ray, _: &Hit) -> f64 {
-        13.0
+    fn tangent(&self, _: &Ray, _: &Hit) -> Tangent {
+        Tangent { normal: DVec3::splat(13.0), normal_error: 18.0, curvature: 19.0 }
     }
     fn precise_lambda(&self, _: &Ray, _: &Hit) -> [f64; 2] {
         [14.0, 15.0]
     }
     fn bounds_under(&self, _: &DAffine3) -> Aabb {
         Aabb::new([16.0; 3], [17.0; 3])
-    }
-    fn normal_error(&self, _: &Ray, _: &Hit) -> f64 {
-        18.0
     }
     fn seen_through(&self) -> Option<(&dyn Shape, &Map)> {
         Some((self, &self.0))
@@ -300,7 +297,7 @@ fn everything(shape: impl Shape) -> String {
     let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
     let hit = shape.intersect(&ray, Interval::FORWARD).unwrap();
     format!(
-        "{hit:?} {} {:?} {} {} {} {:?} {} {} {:?} {:?} {} {:?}",
+        "{hit:?} {} {:?} {} {} {} {:?} {} {:?} {:?} {:?} {:?}",
         shape.normal(&ray, &hit),
         shape.bounds(),
         shape.occludes(&ray, Interval::FORWARD),
@@ -308,10 +305,9 @@ fn everything(shape: impl Shape) -> String {
         shape.texture_coordinates(&ray, &hit),
         shape.point(&ray, &hit),
         shape.departs(&ray, &hit, true),
-        shape.curvature(&ray, &hit),
+        shape.tangent(&ray, &hit),
         shape.precise_lambda(&ray, &hit),
         shape.bounds_under(&DAffine3::IDENTITY),
-        shape.normal_error(&ray, &hit),
         shape.seen_through(),
     )
 }

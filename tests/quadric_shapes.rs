@@ -11,7 +11,7 @@ use support::rng::Rng;
 use support::shapes::shape;
 use truehit::glam::{DVec2, DVec3};
 use truehit::kernel::frustum::{BASE, TOP, WALL};
-use truehit::{Cone, Cylinder, Interval, InvalidShape, Patch, Ray, Shape, Sphere, Surface};
+use truehit::{Cone, Cylinder, Interval, InvalidShape, Patch, Ray, Shape, Sphere, Surface, Tangent};
 
 fn any_shape(rng: &mut Rng) -> Box<dyn Shape> {
     let (p, axis) = (rng.in_cube(5.0), rng.unit() * rng.log(0.1, 10.0));
@@ -105,7 +105,7 @@ fn hits_lie_in_the_box_points_on_the_surface_normals_outward() {
             assert!(!smooth || shape.departs(&back, &hit, false), "{shape:?} {ray:?}");
             let uv = shape.texture_coordinates(&ray, &hit);
             assert!(uv.cmpge(DVec2::ZERO).all() && uv.cmple(DVec2::ONE).all());
-            assert!(shape.curvature(&ray, &hit) >= 0.0);
+            assert!(shape.tangent(&ray, &hit).curvature >= 0.0);
             assert!(shape.occludes(&ray, Interval::FORWARD));
         }
     }
@@ -227,10 +227,11 @@ fn wall_normals_are_within_their_bound_of_the_exact_ones_next_to_the_apex_too() 
             else {
                 continue;
             };
-            let n = shape.normal(&case.ray, &hit);
+            let Tangent { normal: n, normal_error, curvature } = shape.tangent(&case.ray, &hit);
+            assert_eq!(n, shape.normal(&case.ray, &hit));
             // λ's own error turns it by no more than 2⁻⁴⁰: beyond that it is asked for to a hundred bits.
-            let turned = hit.error * case.ray.direction.length() * shape.curvature(&case.ray, &hit);
-            let bound = shape.normal_error(&case.ray, &hit) + turned.min(2f64.powi(-39));
+            let turned = hit.error * case.ray.direction.length() * curvature;
+            let bound = normal_error + turned.min(2f64.powi(-39));
             let off = (n - exact).length();
             assert!(off <= bound + 4.0 * f64::EPSILON, "{}: {off:e} > {bound:e}: {}", family.name, case.hex());
             worst = worst.max(off / bound);

@@ -4,10 +4,11 @@
 
 use super::bound::{INFLATE, U};
 use super::bounded::Bounded;
-use super::cpu;
+use super::cpu::{self, FusedLanes};
 use super::dyadic::Dyadic;
 use super::eft::{Fused, Product, Split, two_sum};
 use super::float::power;
+use super::lanes::{Lanes, Plain};
 use super::number::{Number, Vector, cross, dot, vector};
 use super::ratio::Ratio;
 use super::tally;
@@ -212,11 +213,11 @@ impl Map {
     /// The image of `ray`.
     #[must_use]
     pub fn image(&self, ray: &Ray) -> Image {
-        let image = cpu::dispatch(
+        let image = cpu::dispatch_lanes(
             #[inline(always)]
-            || self.image_with::<Fused>(ray),
+            |cpu| self.image_with::<FusedLanes>(cpu, ray),
             #[inline(always)]
-            || self.image_with::<Split>(ray),
+            || self.image_with::<Plain>((), ray),
         );
         // Where the terms cancel by more than a far-off place explains, two floats may not hold enough of their sum.
         let poor = !image.knows(image.direction_error, image.origin_error, [0.0; 2], ray);
@@ -229,11 +230,11 @@ impl Map {
     fn close_image(&self, ray: &Ray, image: Image) -> Image {
         tally::refined();
         let unknown = self.rest.as_ref().map_or([0.0; 2], |rest| rest.unknown(ray));
-        let close = cpu::dispatch(
+        let close = cpu::dispatch_lanes(
             #[inline(always)]
-            || self.close_image_with::<Fused>(ray, unknown),
+            |cpu| self.close_image_with::<FusedLanes>(cpu, ray, unknown),
             #[inline(always)]
-            || self.close_image_with::<Split>(ray, unknown),
+            || self.close_image_with::<Plain>((), ray, unknown),
         );
         // Nobody can know more than the chain's entries do.
         let [origin, direction] = [close.origin_error - unknown[0], close.direction_error - unknown[1]];
@@ -241,59 +242,34 @@ impl Map {
     }
 
     #[inline(always)]
-    fn close_image_with<P: Product>(&self, ray: &Ray, unknown: [f64; 2]) -> Image {
-        let (o, d, t) = (ray.origin, ray.direction, self.leading.translation);
+    fn close_image_with<L: Lanes>(&self, cpu: L::Cpu, ray: &Ray, unknown: [f64; 2]) -> Image {
         let low = self.rest.as_ref().map_or(DAffine3::ZERO, |rest| rest.low);
-        let t_low = low.translation;
+        let (matrix, low_matrix) = (columns::<L>(cpu, &self.leading.matrix3), columns::<L>(cpu, &low.matrix3));
+        let none = L::new(cpu, [0.0; 4]);
+        let (t, t_low) = (L::of(cpu, self.leading.translation), L::of(cpu, low.translation));
         Image::new(
-            [
-                self.close_row::<P>(0, o, t.x, &low.matrix3, t_low.x),
-                self.close_row::<P>(1, o, t.y, &low.matrix3, t_low.y),
-                self.close_row::<P>(2, o, t.z, &low.matrix3, t_low.z),
-            ],
-            [
-                self.close_row::<P>(0, d, 0.0, &low.matrix3, 0.0),
-                self.close_row::<P>(1, d, 0.0, &low.matrix3, 0.0),
-                self.close_row::<P>(2, d, 0.0, &low.matrix3, 0.0),
-            ],
+            close_product(matrix, low_matrix, ray.origin, t, t_low),
+            close_product(matrix, low_matrix, ray.direction, none, none),
             unknown,
         )
     }
 
+    /// No closures: what is not inlined would be compiled without the instructions that `L` needs.
     #[inline(always)]
-    fn close_row<P: Product>(&self, i: usize, v: DVec3, t: f64, low: &DMat3, t_low: f64) -> (f64, f64, f64) {
-        let m = &self.leading.matrix3;
-        let rows = ([m.x_axis[i], m.y_axis[i], m.z_axis[i]], [low.x_axis[i], low.y_axis[i], low.z_axis[i]]);
-        close_sum::<P>(rows, v, t, t_low)
-    }
-
-    /// No closures: what is not inlined would be compiled without the instructions that `P` needs.
-    #[inline(always)]
-    fn image_with<P: Product>(&self, ray: &Ray) -> Image {
-        let (o, d, t) = (ray.origin, ray.direction, self.leading.translation);
+    fn image_with<L: Lanes>(&self, cpu: L::Cpu, ray: &Ray) -> Image {
+        let (o, d) = (ray.origin, ray.direction);
+        let none = L::new(cpu, [0.0; 4]);
         let (o_low, d_low, unknown) = match &self.rest {
-            None => ([0.0; 3], [0.0; 3], [0.0; 2]),
-            Some(rest) => (rest.low(o, rest.low.translation), rest.low(d, DVec3::ZERO), rest.unknown(ray)),
+            None => (none, none, [0.0; 2]),
+            Some(rest) => {
+                let low = columns::<L>(cpu, &rest.low.matrix3);
+                let moved = plain_product(low, o, L::of(cpu, rest.low.translation));
+                (moved, plain_product(low, d, none), rest.unknown(ray))
+            }
         };
-        Image::new(
-            [
-                self.row::<P>(0, o, t.x, o_low[0]),
-                self.row::<P>(1, o, t.y, o_low[1]),
-                self.row::<P>(2, o, t.z, o_low[2]),
-            ],
-            [
-                self.row::<P>(0, d, 0.0, d_low[0]),
-                self.row::<P>(1, d, 0.0, d_low[1]),
-                self.row::<P>(2, d, 0.0, d_low[2]),
-            ],
-            unknown,
-        )
-    }
-
-    #[inline(always)]
-    fn row<P: Product>(&self, i: usize, v: DVec3, t: f64, low: f64) -> (f64, f64, f64) {
-        let m = &self.leading.matrix3;
-        sum::<P>([m.x_axis[i], m.y_axis[i], m.z_axis[i]], v, t, low)
+        let matrix = columns::<L>(cpu, &self.leading.matrix3);
+        let t = L::of(cpu, self.leading.translation);
+        Image::new(product(matrix, o, t, o_low), product(matrix, d, none, d_low), unknown)
     }
 
     #[cold]
@@ -302,13 +278,14 @@ impl Map {
         tally::exact();
         let (rows, translation) = self.exact();
         let (o, d) = (vector::<Dyadic>(ray.origin), vector::<Dyadic>(ray.direction));
-        let rounded = |x: Dyadic| {
-            let (hi, lo) = x.rounded().0.to_pair();
-            (hi, lo, 4.0 * U * U * hi.abs())
+        let rounded = |exact: Vector<Dyadic>| {
+            let [x, y, z] = exact.map(|x| x.rounded().0.to_pair());
+            let value = DVec3::new(x.0, y.0, z.0);
+            Sum { value, rest: DVec3::new(x.1, y.1, z.1), error: 4.0 * U * U * taxicab(value) }
         };
         let image = Image::new(
-            [0, 1, 2].map(|i| rounded(dot(&rows[i], &o).plus(&translation[i]))),
-            [0, 1, 2].map(|i| rounded(dot(&rows[i], &d))),
+            rounded([0, 1, 2].map(|i| dot(&rows[i], &o).plus(&translation[i]))),
+            rounded([0, 1, 2].map(|i| dot(&rows[i], &d))),
             self.rest.as_ref().map_or([0.0; 2], |rest| rest.unknown(ray)),
         );
         (image.ray.origin.is_finite() && image.ray.direction.is_finite()).then_some(image)
@@ -324,18 +301,6 @@ impl Map {
 }
 
 impl Rest {
-    /// The image of v under the low parts.
-    #[inline(always)]
-    fn low(&self, v: DVec3, t: DVec3) -> [f64; 3] {
-        [self.low_row(0, v, t.x), self.low_row(1, v, t.y), self.low_row(2, v, t.z)]
-    }
-
-    #[inline(always)]
-    fn low_row(&self, i: usize, v: DVec3, t: f64) -> f64 {
-        let m = &self.low.matrix3;
-        (m.x_axis[i] * v.x + m.y_axis[i] * v.y) + (m.z_axis[i] * v.z + t)
-    }
-
     /// By how much not knowing the chain's entries moves origin and direction (|·|₁).
     #[inline(always)]
     fn unknown(&self, ray: &Ray) -> [f64; 2] {
@@ -376,48 +341,88 @@ impl Image {
     }
 
     #[inline(always)]
-    fn new(o: [(f64, f64, f64); 3], d: [(f64, f64, f64); 3], unknown: [f64; 2]) -> Self {
+    fn new(o: Sum, d: Sum, unknown: [f64; 2]) -> Self {
         // Products and their errors may have underflowed.
         let underflow = 64.0 * f64::from_bits(1);
         Self {
-            ray: Ray { origin: DVec3::new(o[0].0, o[1].0, o[2].0), direction: DVec3::new(d[0].0, d[1].0, d[2].0) },
-            origin_low: DVec3::new(o[0].1, o[1].1, o[2].1),
-            direction_low: DVec3::new(d[0].1, d[1].1, d[2].1),
-            origin_error: (o[0].2 + o[1].2 + o[2].2) + underflow + unknown[0],
-            direction_error: (d[0].2 + d[1].2 + d[2].2) + underflow + unknown[1],
+            ray: Ray { origin: o.value, direction: d.value },
+            origin_low: o.rest,
+            direction_low: d.rest,
+            origin_error: o.error + underflow + unknown[0],
+            direction_error: d.error + underflow + unknown[1],
         }
     }
 }
 
-/// r·v + t + `low` in double-double, and a bound on its error: the low part is a sum of seven terms in six additions, and
-/// `low` of four products or less, rounded seven times.
+/// value + rest, known to `error` (|·|₁).
+#[derive(Clone, Copy)]
+struct Sum {
+    value: DVec3,
+    rest: DVec3,
+    error: f64,
+}
+
+impl Sum {
+    #[inline(always)]
+    fn new<L: Lanes>(value: L, rest: L, error: L) -> Self {
+        let [x, y, z, _] = error.to_array();
+        Self { value: three(value), rest: three(rest), error: (x + y) + z }
+    }
+}
+
 #[inline(always)]
-pub(crate) fn sum<P: Product>(r: [f64; 3], v: DVec3, t: f64, low: f64) -> (f64, f64, f64) {
-    let (x, x_lo) = P::two_product(r[0], v.x);
-    let (y, y_lo) = P::two_product(r[1], v.y);
-    let (z, z_lo) = P::two_product(r[2], v.z);
+fn three<L: Lanes>(lanes: L) -> DVec3 {
+    let [x, y, z, _] = lanes.to_array();
+    DVec3::new(x, y, z)
+}
+
+#[inline(always)]
+fn columns<L: Lanes>(cpu: L::Cpu, m: &DMat3) -> [L; 3] {
+    [L::of(cpu, m.x_axis), L::of(cpu, m.y_axis), L::of(cpu, m.z_axis)]
+}
+
+/// M·v + t, rounded seven times.
+#[inline(always)]
+fn plain_product<L: Lanes>(m: [L; 3], v: DVec3, t: L) -> L {
+    (m[0] * t.splat(v.x) + m[1] * t.splat(v.y)) + (m[2] * t.splat(v.z) + t)
+}
+
+/// M·v + t + `low` in double-double, and a bound on its error: each row's low part is a sum of seven terms in six additions,
+/// and `low` of four products or less, rounded seven times.
+#[inline(always)]
+fn product<L: Lanes>(m: [L; 3], v: DVec3, t: L, low: L) -> Sum {
+    let (x, x_lo) = m[0].two_product(t.splat(v.x));
+    let (y, y_lo) = m[1].two_product(t.splat(v.y));
+    let (z, z_lo) = m[2].two_product(t.splat(v.z));
     let (xy, e) = two_sum(x, y);
     let (zt, f) = two_sum(z, t);
     let (s, g) = two_sum(xy, zt);
     let (hi, lo) = two_sum(s, (((e + f) + g) + ((x_lo + y_lo) + z_lo)) + low);
     // Each term is at most u of the sum of the products' absolute values, or of partial sums below that.
     let size = (x.abs() + y.abs()) + (z.abs() + t.abs());
-    (hi, lo, 40.0 * U * U * size)
+    Sum::new(hi, lo, size * t.splat(40.0 * U * U))
 }
 
-/// (r + r_low)·v + t + `t_low` in double-double, summed in three floats, and a bound on its error: docs/numerics.md §8.
 #[inline(always)]
-fn close_sum<P: Product>((r, r_low): ([f64; 3], [f64; 3]), v: DVec3, t: f64, t_low: f64) -> (f64, f64, f64) {
-    let (x, x_lo) = P::two_product(r[0], v.x);
-    let (y, y_lo) = P::two_product(r[1], v.y);
-    let (z, z_lo) = P::two_product(r[2], v.z);
+fn close_product<L: Lanes>(m: [L; 3], m_low: [L; 3], v: DVec3, t: L, t_low: L) -> Sum {
+    let (hi, lo, error) = close_sum(m, m_low, [t.splat(v.x), t.splat(v.y), t.splat(v.z)], t, t_low);
+    Sum::new(hi, lo, error)
+}
+
+/// (r + r_low)·v + t + `t_low` in double-double, summed in three floats, and a bound on its error, each lane for itself:
+/// docs/numerics.md §8.
+#[inline(always)]
+fn close_sum<L: Lanes>(r: [L; 3], r_low: [L; 3], v: [L; 3], t: L, t_low: L) -> (L, L, L) {
+    let (x, x_lo) = r[0].two_product(v[0]);
+    let (y, y_lo) = r[1].two_product(v[1]);
+    let (z, z_lo) = r[2].two_product(v[2]);
     let (xy, e) = two_sum(x, y);
     let (zt, f) = two_sum(z, t);
     let (first, g) = two_sum(xy, zt);
     // What is of the size of the first one's rounding.
-    let (p, p_lo) = P::two_product(r_low[0], v.x);
-    let (q, q_lo) = P::two_product(r_low[1], v.y);
-    let (s, s_lo) = P::two_product(r_low[2], v.z);
+    let (p, p_lo) = r_low[0].two_product(v[0]);
+    let (q, q_lo) = r_low[1].two_product(v[1]);
+    let (s, s_lo) = r_low[2].two_product(v[2]);
     let (ef, a) = two_sum(e, f);
     let (g, b) = two_sum(g, t_low);
     let (lows, c) = two_sum(x_lo, y_lo);
@@ -431,11 +436,26 @@ fn close_sum<P: Product>((r, r_low): ([f64; 3], [f64; 3]), v: DVec3, t: f64, t_l
     let (hi, rest) = two_sum(first, second);
     let (hi, lo) = two_sum(hi, rest + third);
     let size = (x.abs() + y.abs()) + (z.abs() + t.abs());
-    (hi, lo, 2.0 * U * U * hi.abs() + CLOSE_SUM * size)
+    (hi, lo, hi.abs() * t.splat(2.0 * U * U) + size * t.splat(CLOSE_SUM))
 }
 
 /// |error of [`close_sum`] beyond its low float's rounding| ≤ this times the sum of the products' absolute values.
 const CLOSE_SUM: f64 = 256.0 * U * U * U;
+
+/// map · p, each component rounded once but for 41u² of what it is the sum of.
+#[must_use]
+pub(crate) fn transform_point(map: &DAffine3, p: DVec3) -> DVec3 {
+    #[inline(always)]
+    fn with<L: Lanes>(cpu: L::Cpu, map: &DAffine3, p: DVec3) -> DVec3 {
+        product(columns::<L>(cpu, &map.matrix3), p, L::of(cpu, map.translation), L::new(cpu, [0.0; 4])).value
+    }
+    cpu::dispatch_lanes(
+        #[inline(always)]
+        |cpu| with::<FusedLanes>(cpu, map, p),
+        #[inline(always)]
+        || with::<Plain>((), map, p),
+    )
+}
 
 /// |v|₁ ≥ |v|.
 #[inline(always)]
@@ -465,10 +485,11 @@ mod tests {
         fn both_products_answer_with_the_same_bits(x in prop::collection::vec(number(), 30)) {
             let Ok(chain) = Map::from(map(&x[..12])).after(&map(&x[12..24])) else { return Ok(()) };
             let ray = ray(&x[24..]);
-            let (split, fused) = (chain.image_with::<Split>(&ray), chain.image_with::<Fused>(&ray));
+            let cpu = Fused::cpu();
+            let (split, fused) = (chain.image_with::<Plain>((), &ray), chain.image_with::<FusedLanes>(cpu, &ray));
             prop_assert_eq!(format!("{split:?}"), format!("{fused:?}"));
             let [split, fused] =
-                [chain.close_image_with::<Split>(&ray, [0.0; 2]), chain.close_image_with::<Fused>(&ray, [0.0; 2])];
+                [chain.close_image_with::<Plain>((), &ray, [0.0; 2]), chain.close_image_with::<FusedLanes>(cpu, &ray, [0.0; 2])];
             prop_assert_eq!(format!("{split:?}"), format!("{fused:?}"));
         }
 
@@ -483,8 +504,11 @@ mod tests {
                 if moved { turned.plus(&m.1[i]) } else { turned }
             });
             let unknown = chain.rest.as_ref().unwrap().unknown(&ray);
-            let images =
-                [chain.image_with::<Split>(&ray), chain.close_image_with::<Split>(&ray, unknown), chain.exact_image(&ray).unwrap()];
+            let images = [
+                chain.image_with::<Plain>((), &ray),
+                chain.close_image_with::<Plain>((), &ray, unknown),
+                chain.exact_image(&ray).unwrap(),
+            ];
             for image in images {
                 let parts = [
                     (true, ray.origin, image.ray.origin, image.origin_low, image.origin_error),
@@ -510,7 +534,9 @@ mod tests {
             r[2] = -(r[0] * v.x + r[1] * v.y + t) / v.z;
             let low = [0, 1, 2].map(|i| U * x[7 + i] * r[i]);
             let t_low = U * x[10] * t;
-            let (hi, lo, error) = close_sum::<Split>((r, low), v, t, t_low);
+            let all = |x: f64| Plain::new((), [x; 4]);
+            let (hi, lo, error) = close_sum(r.map(all), low.map(all), v.to_array().map(all), all(t), all(t_low));
+            let [hi, lo, error] = [hi, lo, error].map(|x| x.to_array()[0]);
             let number = |x: f64| Rational::try_from(x).ok();
             let exact =
                 dot3(&exact(r.into()), &exact(v)) + dot3(&exact(low.into()), &exact(v)) + number(t)? + number(t_low)?;

@@ -5,7 +5,7 @@ use super::patch::Patch;
 use crate::kernel::bound::U;
 use crate::kernel::float::unit;
 use crate::kernel::frustum::{self, BASE, TOP};
-use crate::{Aabb, Hit, Interval, InvalidShape, Ray, SurfacePoint};
+use crate::{Aabb, Hit, Interval, InvalidShape, Ray, SurfacePoint, Tangent};
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 
@@ -104,12 +104,15 @@ impl Frustum {
     }
 
     pub(super) fn normal(&self, ray: &Ray, hit: &Hit) -> DVec3 {
-        let f = self.foot(ray, hit);
+        self.normal_at(&self.foot(ray, hit), ray, hit)
+    }
+
+    fn normal_at(&self, f: &Foot, ray: &Ray, hit: &Hit) -> DVec3 {
         let axis = unit(f.axis).unwrap_or(DVec3::Z);
         match hit.part {
             BASE => -axis,
             TOP => axis,
-            _ => self.wall_normal(&f, axis, ray),
+            _ => self.wall_normal(f, axis, ray),
         }
     }
 
@@ -201,24 +204,19 @@ impl Frustum {
         if outward { side.is_gt() && self.intersect(ray, Interval::FORWARD).is_none() } else { side.is_lt() }
     }
 
-    /// A cone's wall curves at most as its circle does (by the cosine less).
-    pub(super) fn curvature(&self, ray: &Ray, hit: &Hit) -> f64 {
-        if hit.part == BASE || hit.part == TOP {
-            return 0.0;
-        }
+    /// A cone's wall curves at most as its circle does (by the cosine less). The radial part of its normal is off by 8u of
+    /// the distance from the nearer end; docs/numerics.md §6.
+    pub(super) fn tangent(&self, ray: &Ray, hit: &Hit) -> Tangent {
         let f = self.foot(ray, hit);
-        1.0 / f.local.outside(f.radius * (1.0 - 16.0 * U))
-    }
-
-    /// The radial part is off by 8u of the distance from the nearer end; docs/numerics.md §6.
-    pub(super) fn normal_error(&self, ray: &Ray, hit: &Hit) -> f64 {
+        let normal = self.normal_at(&f, ray, hit);
         if hit.part == BASE || hit.part == TOP {
-            return 16.0 * U;
+            return Tangent { normal, normal_error: 16.0 * U, curvature: 0.0 };
         }
-        let f = self.foot(ray, hit);
+        let radial = length(f.radial);
         // A part of the smallest subnormals has no digits.
-        let rounding = 8.0 * U * (length(f.radial) + length(f.along * f.axis)) + f64::from_bits(16);
-        16.0 * U + rounding / length(f.radial)
+        let rounding = 8.0 * U * (radial + length(f.along * f.axis)) + f64::from_bits(16);
+        let curvature = 1.0 / f.local.outside(f.radius * (1.0 - 16.0 * U));
+        Tangent { normal, normal_error: 16.0 * U + rounding / radial, curvature }
     }
 
     /// Half of ∇f for f(p) = |x|² − t²/h² − R(t)², with x = p − base, t = x·v, v = top − base, h² = |v|².
@@ -282,12 +280,8 @@ macro_rules! shape_by_frustum {
                 self.0.departs(ray, outward)
             }
 
-            fn curvature(&self, ray: &crate::Ray, hit: &crate::Hit) -> f64 {
-                self.0.curvature(ray, hit)
-            }
-
-            fn normal_error(&self, ray: &crate::Ray, hit: &crate::Hit) -> f64 {
-                self.0.normal_error(ray, hit)
+            fn tangent(&self, ray: &crate::Ray, hit: &crate::Hit) -> crate::Tangent {
+                self.0.tangent(ray, hit)
             }
 
             fn precise_lambda(&self, ray: &crate::Ray, hit: &crate::Hit) -> [f64; 2] {

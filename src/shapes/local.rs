@@ -1,8 +1,10 @@
 //! A hit's point in a shape's own place and scale: what normals and projected points are made of.
 
 use crate::Ray;
-use crate::kernel::eft::{Product, Split, two_diff, two_sum};
+use crate::kernel::cpu::{FusedLanes, dispatch_lanes};
+use crate::kernel::eft::{two_diff, two_sum};
 use crate::kernel::float::{exponent_of, ldexp};
+use crate::kernel::lanes::{Lanes, Plain};
 use glam::DVec3;
 
 /// Lengths are divided by 2^exponent, so that squares neither overflow nor vanish.
@@ -45,14 +47,23 @@ impl Local {
         let step = if (1e-150..1e150).contains(&longest) { 0 } else { exponent_of(longest) };
         let d = if step == 0 { ray.direction } else { ray.direction.map(|x| scaled(x, -step)) };
         let [l, rest] = lambda.map(|l| scaled(l, step - self.exponent));
-        let component = |i: usize| {
-            let (x, x_lo) = two_diff(o[i], from[i]);
-            let (p, p_lo) = Split::two_product(l, d[i]);
-            let (s, s_lo) = two_sum(x, p);
-            s + (s_lo + (x_lo + p_lo + rest * d[i]))
-        };
-        DVec3::new(component(0), component(1), component(2))
+        dispatch_lanes(
+            #[inline(always)]
+            |cpu| offset::<FusedLanes>(cpu, o, [l, rest], d, from),
+            #[inline(always)]
+            || offset::<Plain>((), o, [l, rest], d, from),
+        )
     }
+}
+
+#[inline(always)]
+fn offset<L: Lanes>(cpu: L::Cpu, o: DVec3, [l, rest]: [f64; 2], d: DVec3, from: DVec3) -> DVec3 {
+    let d = L::of(cpu, d);
+    let (x, x_lo) = two_diff(L::of(cpu, o), L::of(cpu, from));
+    let (p, p_lo) = d.two_product(d.splat(l));
+    let (s, s_lo) = two_sum(x, p);
+    let [x, y, z, _] = (s + (s_lo + (x_lo + p_lo + d * d.splat(rest)))).to_array();
+    DVec3::new(x, y, z)
 }
 
 /// |v|, whatever its range.

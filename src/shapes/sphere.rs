@@ -3,7 +3,7 @@
 use super::local::{Local, around, length};
 use super::patch::Patch;
 use crate::kernel::{bound::U, float::unit, sphere};
-use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
+use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint, Tangent};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
@@ -128,8 +128,9 @@ impl Shape for Sphere {
         if outward { side.is_gt() && self.intersect(ray, Interval::FORWARD).is_none() } else { side.is_lt() }
     }
 
-    fn curvature(&self, _ray: &Ray, _hit: &Hit) -> f64 {
-        (1.0 / self.radius).next_up()
+    fn tangent(&self, ray: &Ray, hit: &Hit) -> Tangent {
+        let curvature = (1.0 / self.radius).next_up();
+        Tangent { normal: self.normal(ray, hit), normal_error: 16.0 * U, curvature }
     }
 
     fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {
