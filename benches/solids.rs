@@ -10,7 +10,7 @@ use rng::Rng;
 use std::hint::black_box;
 use truehit::glam::DVec3;
 use truehit::kernel::{frustum, sphere, textbook};
-use truehit::{Hit, Interval, Ray};
+use truehit::{Hit, Interval, Ray, Shape, Sphere, Surface};
 
 const RAYS: usize = 4096;
 const FORWARD: Interval = Interval::FORWARD;
@@ -59,6 +59,27 @@ fn spheres(criterion: &mut Criterion) {
         Ray::new(center + r.across(u) * impact - u * 3.0 * radius, u)
     });
     let left = balls(3, |r, center, radius| Ray::new(center + r.unit() * radius, r.unit()));
+    let mut on_it = balls(6, |r, _, _| Ray::new((8.0 * r.in_cube(1.0)).round(), r.unit()));
+    for (i, b) in on_it.iter_mut().enumerate() {
+        let (p, radius) = [
+            (DVec3::new(3.0, 4.0, 0.0), 5.0),
+            (DVec3::new(1.0, -2.0, 2.0), 3.0),
+            (DVec3::new(-2.0, 3.0, 6.0), 7.0),
+            (DVec3::new(0.0, 0.0, 1.0), 1.0),
+        ][i % 4];
+        (b.center, b.radius) = (b.ray.origin, radius);
+        b.ray = Ray::new(b.center + p, b.ray.direction);
+    }
+    let leaving = |sign: f64| {
+        balls(7, move |r, center, radius| {
+            let u = r.unit();
+            let aimed = Ray::new(center + r.across(u) * radius * r.fraction().sqrt() - u * 5.0 * radius, u);
+            let sphere = Sphere::new(center, radius).expect("a sphere");
+            let hit = sphere.intersect(&aimed, FORWARD).expect("an aimed ray");
+            let (surface, d) = (Surface::new(&sphere, &aimed, &hit), r.unit());
+            surface.spawn(if sign * d.dot(surface.normal()) < 0.0 { -d } else { d })
+        })
+    };
     let mut tangents = balls(4, |r, _, _| Ray::new((8.0 * r.in_cube(1.0)).round(), DVec3::X));
     for (i, b) in tangents.iter_mut().enumerate() {
         let (o, d, radius) = [
@@ -75,15 +96,18 @@ fn spheres(criterion: &mut Criterion) {
         ("ordinary", aimed(5.0), half.clone()),
         ("from 1e8 radii", aimed(1e8), half.clone()),
         ("grazed", grazing, half),
-        ("origin on it", left, 0.6..0.9),
+        ("origin rounded onto it", left, 0.6..0.9),
+        ("origin exactly on it", on_it, 0.4..0.6),
+        ("spawned outward", leaving(1.0), 0.0..0.01),
+        ("spawned inward", leaving(-1.0), 0.99..1.01),
         ("exact tangents", tangents, 0.6..1.1),
     ] {
         let mut group = criterion.benchmark_group(format!("sphere, {name}"));
-        // What the textbook makes of grazing rays differs, but some hit.
-        each(&mut group, "textbook", &cases, 0.2..1.1, |b| {
+        // What the textbook makes of rays that graze or leave differs.
+        each(&mut group, "textbook", &cases, 0.0..1.1, |b| {
             textbook::sphere::<f64>(&b.ray, b.center, b.radius, FORWARD)
         });
-        each(&mut group, "Ray Tracing Gems 7", &cases, 0.2..1.1, |b| {
+        each(&mut group, "Ray Tracing Gems 7", &cases, 0.0..1.1, |b| {
             textbook::sphere_gems::<f64>(&b.ray, b.center, b.radius, FORWARD)
         });
         each(&mut group, "shipped", &cases, hits, |b| sphere::intersect(&b.ray, b.center, b.radius, FORWARD));

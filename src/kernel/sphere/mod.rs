@@ -32,7 +32,7 @@ const SQUARED: f64 = 560.0;
 /// See [`SQUARED`].
 const RESIDUAL: f64 = 176.0 * U;
 /// |f|₁ + r below this many radii keeps second-order terms within the constants.
-const FAR: f64 = (1u64 << 46) as f64;
+const FARTHEST: f64 = (1u64 << 46) as f64;
 
 /// The nearest hit of `ray` with the sphere |p − `center`| = `radius` inside `within`.
 ///
@@ -64,8 +64,8 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
         return None;
     }
     let (a, b) = (plain_dot(d, d), plain_dot(f.hi, d));
-    // The root behind the origin, next to it, of a ray that starts inside.
-    let mut entered = false;
+    // Of a ray that starts inside, next to the sphere.
+    let mut entry_is_behind = false;
     // b² − D = A·C
     if (b * b - value).abs() <= near::NEXT * (a * r * r) {
         if !((within.min >= 0.0) & near::is_behind(f.hi, d, b, r)) {
@@ -74,17 +74,16 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
         if b > 0.0 {
             return None;
         }
-        entered = true;
+        entry_is_behind = true;
     }
     let root = value.sqrt();
     // One over A while the root is taken.
     let inverse = 1.0 / a;
     let (z, rest) = bounds(f.hi, d, r, root);
-    // The root at which the polynomial falls (it is entered), then the one at which it rises.
-    for slope in [-1.0, 1.0] {
+    // The root at which the polynomial falls (the sphere is entered), then the one at which it rises.
+    for (slope, is_behind) in [(-1.0, entry_is_behind), (1.0, false)] {
         let first = (slope * root - b) * inverse;
-        if (first + FIRST * z <= within.min) | entered {
-            entered = false;
+        if (first + FIRST * z <= within.min) | is_behind {
             continue;
         }
         // `rest` is far above `FIRST`·u·z: then λ is `first` to within a part of it, and known. Not where the ray grazes.
@@ -113,7 +112,7 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
 fn is_ordinary(f: DVec3, d: DVec3, r: f64) -> bool {
     // 2⁻²⁵⁶ ≤ x < 2²⁵⁶ for both at once: what is out of range, negative or not a number has one of the upper three bits.
     let above = |x: f64| x.to_bits().wrapping_sub((1023 - 256) << 52);
-    ((above(r) | above(plain_dot(d, d) * r * r)) < 512 << 52) & (r + taxicab(f) < FAR * r)
+    ((above(r) | above(plain_dot(d, d) * r * r)) < 512 << 52) & (r + taxicab(f) < FARTHEST * r)
 }
 
 /// D and a bound on its error.

@@ -4,12 +4,10 @@
 //! With B = b as a pair, ε = A·C/B²: the root next to the origin is −C/2B·2/(1 + √(1 − ε)), and the two roots add up to
 //! −2B/A. docs/numerics.md §5, "Next to the origin".
 
-use super::super::bound::{INFLATE, U};
-use super::super::bounded::Bounded;
+use super::super::bound::{INFLATE, U, UNDERFLOW};
 use super::super::cpu;
-use super::super::eft::{Fused, Product, Split, quick_two_sum, two_sum};
+use super::super::eft::{Fused, Product, Split, quick_two_sum, two_diff, two_sum};
 use super::super::float::power;
-use super::super::number::{Number, difference, dot};
 use super::super::pair::{Pair, close_dot, plain_dot, taxicab};
 use super::super::section::FINE;
 use crate::hit::Hit;
@@ -19,20 +17,22 @@ use glam::{DVec2, DVec3};
 
 /// A ray starts next to the sphere if |A·C| ≤ this·A·r².
 pub(super) const NEXT: f64 = power(-30);
-/// It does not graze the sphere if |b| ≥ this·r·|d|₁; then ε < 2⁻⁹.
-const STEEP: f64 = power(-10);
+/// It does not graze the sphere there if |ε| is at most this.
+const STEEP: f64 = power(-20);
 /// |error of C in plain arithmetic| ≤ this·r².
 const PLAIN_C: f64 = 8.0 * U;
 /// |error of b in plain arithmetic| ≤ this·r·|d|₁.
 const PLAIN_B: f64 = 8.0 * U;
 /// |error of C in double-double| ≤ this·r².
 const CLOSE_C: f64 = 32.0 * U * U;
-/// |error of the root next to the origin, beside what C's brings| ≤ this·|λ|.
-const NEAR: f64 = U / 64.0;
-/// |error of the other root, beside that one's| ≤ this·r·|d|₁/A.
-const FAR: f64 = 256.0 * U * U;
+/// A product of floats at least this large is a sum of two floats.
+const EXACT: f64 = power(-900);
+/// |error of the near root, beside what C's brings| ≤ this·|λ|.
+const NEAR_ROOT: f64 = U / 64.0;
+/// |error of the far root, beside the near one's| ≤ this·r·|d|₁/A.
+const FAR_ROOT: f64 = 256.0 * U * U;
 
-/// Whether plain arithmetic is certain that the root next to the origin lies behind it: what is left then is the far root
+/// Whether plain arithmetic is certain that the near root lies behind the origin: what is left then is the far root
 /// if b is below zero, none if it is not. So it is with rays that were spawned where a ray left the sphere.
 #[inline(always)]
 pub(super) fn is_behind(f: DVec3, d: DVec3, b: f64, r: f64) -> bool {
@@ -40,66 +40,116 @@ pub(super) fn is_behind(f: DVec3, d: DVec3, b: f64, r: f64) -> bool {
     (c * b > 0.0) & (c.abs() > PLAIN_C * (r * r)) & (b.abs() > PLAIN_B * (r * taxicab(d)))
 }
 
-/// The nearest hit inside `within`. The ray is ordinary and |A·C| ≤ [`NEXT`]·A·r². Scalars, so that the caller's vectors
-/// stay in registers.
+/// The nearest hit inside `within`. The ray is ordinary, D is certainly positive, |A·C| ≤ [`NEXT`]·A·r². Scalars, so that
+/// the caller's vectors stay in registers.
 #[inline(never)]
 pub(super) fn intersect(ray: &Ray, x: f64, y: f64, z: f64, r: f64, min: f64, max: f64) -> Option<Hit> {
+    // Captured in this order: coordinates side by side would be loaded as a vector just after they were stored one by one,
+    // and wait for that.
     cpu::dispatch(
         #[inline(always)]
-        move || roots::<Fused>(ray, DVec3::new(x, y, z), r, Interval { min, max }),
+        move || ahead::<Fused>(ray, x, r, y, min, z, max),
         #[inline(always)]
-        move || roots::<Split>(ray, DVec3::new(x, y, z), r, Interval { min, max }),
+        move || ahead::<Split>(ray, x, r, y, min, z, max),
     )
 }
 
+/// λ ≥ 0 only, as mostly asked for, and C from double-double.
 #[inline(always)]
-fn roots<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Option<Hit> {
-    let cold = || super::refine(ray, center.x, center.y, center.z, r, within.min, within.max);
-    let (f, d) = (Pair::difference(ray.origin, center), ray.direction);
-    let (b, reach) = (slope::<P>(&f, d), r * taxicab(d));
+fn ahead<P: Product>(ray: &Ray, x: f64, r: f64, y: f64, min: f64, z: f64, max: f64) -> Option<Hit> {
+    let (f, d, within) = (Pair::difference(ray.origin, DVec3::new(x, y, z)), ray.direction, Interval { min, max });
     let mut c = Excess::new::<P>(&f, r);
-    let steep = b.0.abs() >= STEEP * reach;
-    let certain = c.hi.abs() > c.error;
-    if !steep || !certain && c.on_it(ray, center, r).is_none() {
-        return cold();
+    if c.hi.abs() <= c.error && Excess::is_zero::<P>(&f, r) {
+        c = Excess { hi: 0.0, lo: 0.0, error: 0.0 };
     }
-    // The far root lies behind the origin if b is above zero; the near one if C has the sign of b, or on it if C is zero.
-    let (forward, behind, near_behind) = (within.min >= 0.0, b.0 > 0.0, c.hi * b.0 >= 0.0);
-    if forward & near_behind & behind {
-        return None;
+    let roots = Roots::new::<P>(&f, d, &c);
+    if (within.min >= 0.0) & roots.known {
+        // The near root lies behind the origin if C has the sign of b, on it if C is zero; the far one if b is above zero.
+        let root = if c.hi * roots.b >= 0.0 {
+            if roots.b > 0.0 {
+                return None;
+            }
+            roots.far::<P>(&c, d, r)
+        } else {
+            roots.near::<P>(&c)
+        };
+        match root.place(ray, r, within) {
+            Place::Inside(hit) => return Some(hit),
+            Place::Beyond => return None,
+            Place::Before | Place::Unknown => {}
+        }
     }
-    let near_first = if forward { !near_behind } else { !behind };
-    for is_near in [near_first, !near_first] {
-        if forward & if is_near { near_behind } else { behind } {
-            continue;
-        }
-        let (lambda, lo, rest) = if is_near { c.root::<P>(b, d) } else { c.other_root::<P>(b, d, reach) };
-        let error = (lo.abs() + rest) * INFLATE;
-        // What is promised: the last bit, or that of 2⁻⁴⁰ of the coordinates. Mostly the radius is large enough.
-        let fine = |size: f64| rest * (1.75 * taxicab(d)) <= 0.5 * U * FINE * size;
-        let known = rest <= 0.4 * U * lambda.abs() || fine(r) || fine(ray.origin.abs().max(center.abs()).max_element());
-        if !known {
-            return cold();
-        }
-        if (lambda - error > within.min) & (lambda + error < within.max) {
-            return Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 });
-        }
-        if lambda - error > within.max {
-            return None;
-        }
-        let before = lambda + error < within.min;
-        if !before {
-            return cold();
+    again(ray, x, y, z, r, within.min, within.max)
+}
+
+/// Any interval, and C however small.
+#[cold]
+#[inline(never)]
+fn again(ray: &Ray, x: f64, y: f64, z: f64, r: f64, min: f64, max: f64) -> Option<Hit> {
+    let (f, d, within) = (Pair::difference(ray.origin, DVec3::new(x, y, z)), ray.direction, Interval { min, max });
+    let c = Excess::closer(&f, r);
+    let roots = Roots::new::<Split>(&f, d, &c);
+    let refine = || super::refine(ray, x, y, z, r, min, max);
+    if !roots.known {
+        return refine();
+    }
+    let (near, far) = (roots.near::<Split>(&c), roots.far::<Split>(&c, d, r));
+    for root in if roots.b > 0.0 { [far, near] } else { [near, far] } {
+        match root.place(ray, r, within) {
+            Place::Inside(hit) => return Some(hit),
+            Place::Beyond => return None,
+            Place::Before => {}
+            Place::Unknown => return refine(),
         }
     }
     None
 }
 
-/// b as hi + lo, |lo| ≤ u|hi|; not for rays that graze.
-#[inline(always)]
-fn slope<P: Product>(f: &Pair, d: DVec3) -> (f64, f64) {
-    let (b, b_lo) = f.dot_float::<P>(d);
-    quick_two_sum(b, b_lo)
+/// Where a root lies against an interval.
+enum Place {
+    Before,
+    Inside(Hit),
+    Beyond,
+    Unknown,
+}
+
+/// λ = hi + lo to within `rest`.
+struct Root {
+    hi: f64,
+    lo: f64,
+    rest: f64,
+}
+
+impl Root {
+    #[inline(always)]
+    fn place(&self, ray: &Ray, r: f64, within: Interval) -> Place {
+        let (lambda, error) = (self.hi, (self.lo.abs() + self.rest) * INFLATE);
+        // What is promised: the last bit, or that of 2⁻⁴⁰ of the coordinates. Mostly the radius is large enough.
+        let fine = |size: f64| self.rest * (1.75 * taxicab(ray.direction)) <= 0.5 * U * FINE * size;
+        let known = (self.rest <= 0.4 * U * lambda.abs()) || fine(r);
+        if !known {
+            Place::Unknown
+        } else if (lambda - error > within.min) & (lambda + error < within.max) {
+            Place::Inside(Hit { lambda, error, uv: DVec2::ZERO, part: 0 })
+        } else if lambda - error > within.max {
+            Place::Beyond
+        } else if lambda + error < within.min {
+            Place::Before
+        } else {
+            Place::Unknown
+        }
+    }
+}
+
+/// What both roots are made of.
+struct Roots {
+    b: f64,
+    b_lo: f64,
+    /// 1/2b
+    half: f64,
+    epsilon: f64,
+    /// C's sign is certain and the ray does not graze: then b's is too.
+    known: bool,
 }
 
 /// C = |f|² − r² as hi + lo, off by at most `error`.
@@ -116,52 +166,86 @@ impl Excess {
         Self { hi, lo, error: CLOSE_C * (r * r) }
     }
 
-    /// Where double-double cannot tell its sign: on the sphere it is zero.
-    #[cold]
-    #[inline(never)]
-    fn on_it(&mut self, ray: &Ray, center: DVec3, r: f64) -> Option<()> {
-        let f = difference::<Bounded>(ray.origin, center);
-        let c = dot(&f, &f).minus(&Bounded::exactly(r).squared());
-        c.sign()?;
-        *self = Self { hi: c.hi, lo: c.lo, error: c.error };
-        Some(())
+    /// Zero on the sphere: whether it is that, for certain.
+    #[inline(always)]
+    fn is_zero<P: Product>(f: &Pair, r: f64) -> bool {
+        let square = |x: f64| P::two_product(x, x);
+        let ((x, x_lo), (y, y_lo), (z, z_lo), (r2, r_lo)) = (square(f.hi.x), square(f.hi.y), square(f.hi.z), square(r));
+        let ((s, s_lo), (t, t_lo)) = (two_sum(x, y), two_diff(z, r2));
+        let ((g, g_lo), (h, h_lo), (i, i_lo)) = (two_sum(s_lo, t_lo), two_sum(x_lo, y_lo), two_diff(z_lo, r_lo));
+        let (j, j_lo) = two_sum(g, h);
+        let ((k, k_lo), (sum, sum_lo)) = (two_sum(j, i), two_sum(s, t));
+        let dropped = g_lo.abs() + h_lo.abs() + i_lo.abs() + j_lo.abs() + k_lo.abs() + sum_lo.abs();
+        let exact = |x: f64, square: f64| (x == 0.0) | (square >= EXACT);
+        let squares = exact(f.hi.x, x) & exact(f.hi.y, y) & exact(f.hi.z, z) & (f.lo == DVec3::ZERO);
+        squares & (dropped == 0.0) & (sum == -k)
     }
 
-    /// −C/2b, and what is to be added in proportion for λ: 2/(1 + √(1 − ε)) = 1 + ε/(1 + √(1 − ε))².
-    #[inline(always)]
-    fn first(&self, half: f64, d: DVec3) -> (f64, f64) {
-        let epsilon = plain_dot(d, d) * (self.hi * (4.0 * (half * half)));
-        let curved = if epsilon.abs() <= power(-20) {
-            0.25 + 0.125 * epsilon
-        } else {
-            let s = 1.0 + (1.0 - epsilon).sqrt();
-            1.0 / (s * s)
-        };
-        (-self.hi * half, epsilon * curved)
+    /// With what the sums and products of the other round away: zero on the sphere, for certain.
+    fn closer(f: &Pair, r: f64) -> Self {
+        let Pair { hi: h, lo: l } = *f;
+        let (h2, mut parts, mut lost) = (2.0 * h, [0.0; 20], 0.0);
+        let products = [
+            [(h.x, h.x), (h.y, h.y), (h.z, h.z), (r, -r), (h2.x, l.x)],
+            [(h2.y, l.y), (h2.z, l.z), (l.x, l.x), (l.y, l.y), (l.z, l.z)],
+        ];
+        for (&(a, b), parts) in products.as_flattened().iter().zip(parts.as_chunks_mut().0) {
+            let (p, rounded) = Split::two_product(a, b);
+            *parts = [p, rounded];
+            if p.abs() < EXACT && a != 0.0 && b != 0.0 {
+                lost = UNDERFLOW;
+            }
+        }
+        for _ in 0..2 {
+            for i in 1..parts.len() {
+                (parts[i], parts[i - 1]) = two_sum(parts[i], parts[i - 1]);
+            }
+        }
+        let [rest @ .., sum] = &parts;
+        let (hi, lo) = two_sum(*sum, rest.iter().sum());
+        let size: f64 = rest.iter().map(|x| x.abs()).sum();
+        Self { hi, lo, error: 32.0 * U * size + lost }
     }
+}
 
-    /// λ next to the origin as hi + lo, and a bound on what that is off.
+impl Roots {
     #[inline(always)]
-    fn root<P: Product>(&self, (b, b_lo): (f64, f64), d: DVec3) -> (f64, f64, f64) {
+    fn new<P: Product>(f: &Pair, d: DVec3, c: &Excess) -> Self {
+        let (b, b_lo) = f.dot_float::<P>(d);
+        let (b, b_lo) = quick_two_sum(b, b_lo);
         let half = 0.5 / b;
-        let (first, more) = self.first(half, d);
+        let epsilon = plain_dot(d, d) * (c.hi * (4.0 * (half * half)));
+        let certain = (c.hi.abs() > c.error) | (c.error == 0.0);
+        Self { b, b_lo, half, epsilon, known: certain & (epsilon.abs() <= STEEP) }
+    }
+
+    /// −C/2b, and in proportion 2/(1 + √(1 − ε)) − 1 = ε/4 + ε²/8 + … more.
+    #[inline(always)]
+    fn first(&self, c: &Excess) -> (f64, f64) {
+        (-c.hi * self.half, self.epsilon * (0.25 + 0.125 * self.epsilon))
+    }
+
+    #[inline(always)]
+    fn near<P: Product>(&self, c: &Excess) -> Root {
+        let (&Self { b, b_lo, half, .. }, (first, more)) = (self, self.first(c));
         // One step of the division.
-        let rest = P::remainder(-self.hi, first, 2.0 * b) - (self.lo + 2.0 * (first * b_lo));
+        let rest = P::remainder(-c.hi, first, 2.0 * b) - (c.lo + 2.0 * (first * b_lo));
         let (hi, lo) = two_sum(first, rest * half + first * more);
         // Zero is that of no sign.
-        (hi + 0.0, lo, 1.01 * (self.error * half.abs()) + NEAR * hi.abs())
+        Root { hi: hi + 0.0, lo, rest: 1.01 * (c.error * half.abs()) + NEAR_ROOT * hi.abs() }
     }
 
-    /// The other λ: both add up to −2b/A.
+    /// −2b/A less the near one.
     #[inline(always)]
-    fn other_root<P: Product>(&self, (b, b_lo): (f64, f64), d: DVec3, reach: f64) -> (f64, f64, f64) {
-        let (half, (a, a_lo)) = (0.5 / b, close_dot::<P>(d, d));
+    fn far<P: Product>(&self, c: &Excess, d: DVec3, r: f64) -> Root {
+        let (&Self { b, b_lo, half, .. }, (near, more)) = (self, self.first(c));
+        let (a, a_lo) = close_dot::<P>(d, d);
         let inverse = 1.0 / a;
-        let (near, more) = self.first(half, d);
         let first = -2.0 * (b * inverse);
         let rest = P::remainder(-2.0 * b, first, a) - (2.0 * b_lo + first * a_lo);
         let (hi, lo) = two_sum(first, rest * inverse - (near + near * more));
-        (hi, lo, FAR * (reach * inverse) + 1.01 * (self.error * half.abs()) + 8.0 * U * near.abs())
+        let rest = FAR_ROOT * (r * taxicab(d) * inverse) + 1.01 * (c.error * half.abs()) + 8.0 * U * near.abs();
+        Root { hi, lo, rest }
     }
 }
 
@@ -213,28 +297,38 @@ mod tests {
             ratio(exact - rational(c.hi) - rational(c.lo), c.error)
         });
         assert!((0.02..1.0).contains(&worst));
+        // Hardly anything is left out, and little is known of that: far less than of C in double-double.
+        let worst = climb("sphere, start: C, closer", 12, |x| {
+            let (ray, center, r) = setting(x)?;
+            let c = Excess::closer(&Pair::difference(ray.origin, center), r);
+            let [.., exact] = polynomial(&ray, center, r);
+            let off = exact - rational(c.hi) - rational(c.lo);
+            assert!(c.error <= power(-40) * CLOSE_C * (r * r) + 64.0 * U * U * c.hi.abs());
+            if off.is_zero() { Some(0.0) } else { ratio(off, c.error) }
+        });
+        assert!(worst < 1.0);
         // The whole bound, C's share included, and the part of it that is not C's: C as it is, exactly.
-        for (name, other, sharp) in [
-            ("sphere, start: λ", false, false),
-            ("sphere, start: λ but for C", false, true),
-            ("sphere, start: other λ", true, false),
+        for (name, far, sharp) in [
+            ("sphere, start: near λ", false, false),
+            ("sphere, start: near λ but for C", false, true),
+            ("sphere, start: far λ", true, false),
         ] {
             let worst = climb(name, 12, |x| {
                 let (ray, center, r) = setting(x)?;
                 let (f, d) = (Pair::difference(ray.origin, center), ray.direction);
-                let (b, reach) = (slope::<Split>(&f, d), r * taxicab(d));
                 let mut c = Excess::new::<Split>(&f, r);
-                let [a, bb, mut cc] = polynomial(&ray, center, r);
-                if c.hi.abs() <= c.error || b.0.abs() < STEEP * reach {
+                let roots = Roots::new::<Split>(&f, d, &c);
+                let [a, b, mut cc] = polynomial(&ray, center, r);
+                if !roots.known {
                     return None;
                 }
                 if sharp {
                     c.error = 0.0;
                     cc = rational(c.hi) + rational(c.lo);
                 }
-                let (hi, lo, rest) = if other { c.other_root::<Split>(b, d, reach) } else { c.root::<Split>(b, d) };
+                let Root { hi, lo, rest } = if far { roots.far::<Split>(&c, d, r) } else { roots.near::<Split>(&c) };
                 let l = rational(hi) + rational(lo);
-                let off = ((&a * &l + &bb + &bb) * &l + cc) / (Rational::from(2) * (a * l + bb));
+                let off = ((&a * &l + &b + &b) * &l + cc) / (Rational::from(2) * (a * l + b));
                 ratio(off, rest)
             });
             assert!((0.002..1.0).contains(&worst), "{name}: {worst}");
@@ -265,6 +359,24 @@ mod tests {
         });
         println!("{rays} rays that start next to a sphere, {hits} hits, {cold} refined");
         assert!(rays > 50_000 && 3 * hits > rays && 20 * cold < rays);
+    }
+
+    /// However little a point is off the sphere, it is not on it.
+    #[test]
+    fn next_to_the_sphere_is_not_on_it() {
+        let on = |x: f64, y: f64, z: f64, r: f64| {
+            let f = Pair { hi: DVec3::new(x, y, z), lo: DVec3::ZERO };
+            let is = [Excess::is_zero::<Fused>(&f, r), Excess::is_zero::<Split>(&f, r)];
+            assert_eq!(is[0], is[1]);
+            is[0]
+        };
+        for r in [1.0, 1.0 + 2.0 * U, 1e70, 0.1] {
+            assert!(on(0.0, r, 0.0, r) && on(0.0, 0.0, -r, r));
+            for e in 0..1070 {
+                let t = r * power(-(e.min(537))) * power(-(e - e.min(537)));
+                assert!(!on(t, 0.0, r, r) && !on(r, t, 0.0, r) && !on(0.0, -r, t, r) && !on(t, -t, r, r), "{r} {e}");
+            }
+        }
     }
 
     /// On the sphere exactly: zero is found without integers.
