@@ -5,10 +5,9 @@
 
 use super::frame::Frame;
 use super::slab::{E, LENGTHS, NEAR, PLAIN_ERROR, SLAB, STEEPEST};
-use super::traverse::Stack;
 use super::wide::{LEAF, Wide, WideNode, near_rows};
 use crate::{Interval, Ray};
-use fearless_simd::{Simd, f32x8, f64x4, prelude::*};
+use fearless_simd::{Simd, f32x8, f64x4, i32x8, mask32x8, prelude::*, u8x32};
 
 /// How many rays a bundle has.
 pub(crate) const RAYS: usize = 32;
@@ -17,11 +16,8 @@ pub(crate) const RAYS: usize = 32;
 pub(crate) const EIGHTS: usize = RAYS / 8;
 
 /// Bundles wider than this, in directions over their length and in origins over the tree's size, would visit much that
-/// none of their rays meets.
+/// none of their rays meets. Rays from one place share enough without it.
 const WIDEST: f32 = 1.0 / 8.0;
-
-/// Rays from one place share more. The margin of the test of all directions at once is for no more than this: docs/numerics.md §10.
-const WIDEST_FROM_ONE_PLACE: f32 = 0.5;
 
 /// Slopes steeper than this, against the direction's longest coordinate, have inverses that bound nothing: such an axis is left
 /// out of the bounds, as is one on which the rays go either way.
@@ -300,8 +296,7 @@ impl Bundle {
             turn = if d_high - d_low > turn { d_high - d_low } else { turn };
         }
         let one_place = spread <= ONE_PLACE * (1.0 + size);
-        let widest = if one_place { WIDEST_FROM_ONE_PLACE } else { WIDEST };
-        let alike = (spread <= widest) & (turn <= widest * self.lengths[0]);
+        let alike = one_place | (spread <= WIDEST) & (turn <= WIDEST * self.lengths[0]);
         let (farthest, shortest, error) = match from {
             Start::Origin => (NEAR, LENGTHS[0], PLAIN_ERROR),
             // Twice as far, half as short: no t is longer than from an origin.
@@ -396,7 +391,7 @@ struct Bounds<S: Simd> {
 impl<S: Simd> Bounds<S> {
     /// Which of the node's boxes a ray may meet before `t_max`, and from which t on.
     #[inline(always)]
-    fn test(&self, simd: S, node: &WideNode, t_max: f32) -> (u32, f32x8<S>) {
+    fn test(&self, simd: S, node: &WideNode, t_max: f32) -> (mask32x8<S>, f32x8<S>) {
         let (mut enter, mut exit) = (self.t_min, f32x8::splat(simd, t_max));
         for axis in 0..3 {
             let (least, greatest) = (self.inverse[0][axis], self.inverse[1][axis]);
@@ -405,8 +400,92 @@ impl<S: Simd> Bounds<S> {
             enter = enter.max((near * least).min(near * greatest));
             exit = exit.min((far * least).max(far * greatest));
         }
-        let miss = enter.simd_gt(exit + f32x8::splat(simd, UNDERFLOW));
-        (!(miss.to_bitmask() as u32) & 0xff, enter)
+        (enter.simd_le(exit + f32x8::splat(simd, UNDERFLOW)), enter)
+    }
+}
+
+/// Where the lane stands in a key, whose other bits are those of t.
+const LANE: i32 = 7;
+
+/// Of t, before it loses its last bits to the lane: seven units in the last place are less.
+const ROUNDED: f32 = 1.0 / 524_288.0; // 2⁻¹⁹
+
+/// Keys of those lanes that are hit, the farthest first, and after them what means nothing. As signed integers they sort as t does,
+/// but for negative ones among themselves. By Batcher's network, without a branch.
+#[inline(always)]
+fn in_order<S: Simd>(simd: S, hits: mask32x8<S>, enter: f32x8<S>) -> [i32; 8] {
+    let t: i32x8<S> = enter.abs().mul_add(f32x8::splat(simd, -ROUNDED), enter).bitcast();
+    let lanes = i32x8::simd_from(simd, [0, 1, 2, 3, 4, 5, 6, 7]);
+    let keys = hits.select(t & i32x8::splat(simd, !LANE) | lanes, i32x8::splat(simd, i32::MIN));
+    let keys = exchange(simd, keys, turned(simd, keys, 1), 0b0101_0101);
+    let keys = exchange(simd, keys, turned(simd, keys, 3), 0b0011_0011);
+    let keys = exchange(simd, keys, turned(simd, keys, 1), 0b0101_0101);
+    let keys = exchange(simd, keys, keys.reverse(), 0b0000_1111);
+    let keys = exchange(simd, keys, turned(simd, keys, 2), 0b0011_0011);
+    exchange(simd, keys, turned(simd, keys, 1), 0b0101_0101).into()
+}
+
+/// The larger of the two in these lanes, the lesser in the others.
+#[inline(always)]
+fn exchange<S: Simd>(simd: S, a: i32x8<S>, b: i32x8<S>, larger: u64) -> i32x8<S> {
+    mask32x8::from_bitmask(simd, larger).select(a.max(b), a.min(b))
+}
+
+/// In lane i what was in lane i ^ `by`, which is less than four.
+#[inline(always)]
+fn turned<S: Simd>(simd: S, keys: i32x8<S>, by: u8) -> i32x8<S> {
+    let mut bytes = [0; 32];
+    for i in 0..32 {
+        bytes[i as usize] = (i ^ (by << 2)) & 15;
+    }
+    keys.swizzle_dyn_within_blocks(u8x32::simd_from(simd, bytes))
+}
+
+/// Boxes left to visit, by node and lane. What does not fit, which no sensible tree needs, goes to the heap.
+struct Waiting {
+    keys: [i32; ROOM + 8],
+    nodes: [u32; ROOM + 8],
+    len: usize,
+    spilled: Vec<(i32, u32)>,
+}
+
+const ROOM: usize = 40;
+
+impl Waiting {
+    #[inline(always)]
+    fn new() -> Self {
+        Self { keys: [0; ROOM + 8], nodes: [0; ROOM + 8], len: 0, spilled: Vec::new() }
+    }
+
+    /// Adds the first `count` boxes of `node`.
+    #[inline(always)]
+    fn push(&mut self, node: u32, count: u32, keys: [i32; 8]) {
+        if self.len > ROOM {
+            self.spill();
+        }
+        let at = self.len.min(ROOM);
+        self.keys[at..at + 8].copy_from_slice(&keys);
+        self.nodes[at..at + 8].copy_from_slice(&[node; 8]);
+        self.len = at + count as usize;
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn spill(&mut self) {
+        let entries = self.keys.iter().zip(&self.nodes).map(|(&key, &node)| (key, node));
+        self.spilled.extend(entries.take(self.len));
+        self.len = 0;
+    }
+
+    /// The last one.
+    #[inline(always)]
+    fn pop(&mut self) -> Option<(i32, u32)> {
+        if self.len == 0 {
+            return self.spilled.pop();
+        }
+        self.len -= 1;
+        let at = self.len.min(ROOM + 7);
+        Some((self.keys[at], self.nodes[at]))
     }
 }
 
@@ -423,29 +502,18 @@ pub(crate) trait Together<S: Simd> {
 pub(crate) fn together<S: Simd>(simd: S, tree: &Wide, walk: &mut impl Together<S>) {
     let nodes = &tree.nodes[..];
     let bounds = walk.bundle().bounds(simd);
-    // Boxes by where they stand: node and lane.
-    let mut stack = Stack::<i64>::new();
+    let mut waiting = Waiting::new();
     let mut at = 0;
     loop {
-        let (mut hits, enter) = bounds.test(simd, &nodes[at as usize], walk.bundle().t_max);
-        let enter: [f32; 8] = enter.into();
-        stack.reserve();
-        let mut count = 0;
-        while hits != 0 {
-            let lane = hits.trailing_zeros();
-            hits &= hits - 1;
-            // Signed, as a single ray's entries are.
-            let t = enter[lane as usize & 7].to_bits();
-            stack.insert((u64::from(t) << 32 | u64::from(at << 3 | lane)) as i64, count);
-            count += 1;
-        }
+        let (hits, enter) = bounds.test(simd, &nodes[at as usize], walk.bundle().t_max);
+        waiting.push(at, hits.to_bitmask().count_ones(), in_order(simd, hits, enter));
         at = loop {
-            let Some(entry) = stack.pop() else { return };
+            let Some((key, node)) = waiting.pop() else { return };
             let bundle = walk.bundle();
-            if f32::from_bits((entry >> 32) as u32) > bundle.t_max {
+            if f32::from_bits((key & !LANE) as u32) > bundle.t_max {
                 continue;
             }
-            let (node, lane) = (&nodes[(entry as u32 >> 3) as usize], entry as usize & 7);
+            let (node, lane) = (&nodes[node as usize], (key & LANE) as usize);
             let rays = bundle.meet(simd, node, lane, &bounds.near);
             if rays == 0 {
                 continue;

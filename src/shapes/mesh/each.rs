@@ -9,6 +9,7 @@ use super::settle::settle;
 use crate::bvh::{self, Bundle, EIGHTS, Limits, RAYS, Start};
 use crate::{Hit, Interval, Ray};
 use fearless_simd::{Simd, dispatch, f32x8, mask32x8, prelude::*, u32x8};
+use glam::DVec3;
 
 /// A ray and the stretch of it that counts.
 pub(super) type Stretch = (Ray, Interval);
@@ -44,18 +45,18 @@ fn each<T>(
     alone: impl Fn(&Stretch) -> T,
 ) {
     const MOST_PATIENT: u32 = 64;
-    let (mut wait, mut patience) = (0, 1);
+    let (mut wait, mut patience) = (0, 0);
     let (bundles, rest) = rays.as_chunks::<RAYS>();
     let (of_bundles, of_rest) = hits.as_chunks_mut::<RAYS>();
     for (rays, hits) in bundles.iter().zip(of_bundles) {
         if wait > 0 {
             wait -= 1;
-        } else if go_together(rays) && together(rays, hits) {
-            patience = 1;
+        } else if together(rays, hits) {
+            patience = 0;
             continue;
         } else {
             wait = patience;
-            patience = (2 * patience).min(MOST_PATIENT);
+            patience = (2 * patience).clamp(1, MOST_PATIENT);
         }
         for (hit, ray) in hits.iter_mut().zip(rays) {
             *hit = alone(ray);
@@ -69,16 +70,21 @@ fn each<T>(
 /// A first look that costs next to nothing: whether a few directions are alike. [`Bundle::take`] looks at all.
 fn go_together(rays: &[Stretch; RAYS]) -> bool {
     let first = rays[0].0.direction;
-    let close = 0.5 * first.abs().max_element();
-    (1..4).all(|i| (rays[i * (RAYS - 1) / 3].0.direction - first).abs().max_element() <= close)
+    (1..4).all(|i| is_near(first, rays[i * (RAYS - 1) / 3].0.direction))
 }
 
-/// Alike, whether the rays may end at one place.
+/// Alike, whether the rays may end at one place, and most come there the way their neighbours do: they start at surfaces, here and
+/// there at another than the one before.
 fn end_together(rays: &[Stretch; RAYS]) -> bool {
     let end = |(ray, within): &Stretch| ray.origin + within.max * ray.direction;
     let (first, last) = (end(&rays[0]), end(&rays[RAYS - 1]));
     let way = rays[0].1.max.abs() * rays[0].0.direction.abs().max_element();
-    (first - last).abs().max_element() <= way * 1e-5
+    let neighbours = |i: &usize| is_near(rays[*i].0.direction, rays[i + 1].0.direction);
+    (first - last).abs().max_element() <= way * 1e-5 && [3, 12, 19, 28].iter().filter(|i| neighbours(i)).count() >= 3
+}
+
+fn is_near(a: DVec3, b: DVec3) -> bool {
+    (b - a).abs().max_element() <= 0.5 * a.abs().max_element()
 }
 
 /// A bundle's walk, with what all its rays have in common.
@@ -226,7 +232,7 @@ fn closest_with<S: Simd>(
     bundle: &mut Bundle,
     hits: &mut [Option<Hit>; RAYS],
 ) -> bool {
-    if !bundle.take(simd, mesh.frame(), rays, Start::Origin) {
+    if !(go_together(rays) && bundle.take(simd, mesh.frame(), rays, Start::Origin)) {
         return false;
     }
     *hits = [None; RAYS];
@@ -350,7 +356,7 @@ fn any_with<S: Simd>(
 ) -> bool {
     // Rays to a light, from the light; t is then `max` − λ.
     let to_one_place = end_together(rays) && bundle.take(simd, mesh.frame(), rays, Start::End);
-    if !(to_one_place || bundle.take(simd, mesh.frame(), rays, Start::Origin)) {
+    if !(to_one_place || go_together(rays) && bundle.take(simd, mesh.frame(), rays, Start::Origin)) {
         return false;
     }
     *hits = [false; RAYS];
