@@ -1,19 +1,19 @@
 //! Rays that go the same way, walked together.
 //!
 //! A node's boxes are tested with the bounds of all origins and inverse directions first, at the price of one ray, and each
-//! box that is next in turn with all rays, eight a vector: docs/numerics.md §10.
+//! box that is next in turn with all rays, sixteen a vector: docs/numerics.md §10.
 
 use super::frame::Frame;
 use super::slab::{E, LENGTHS, NEAR, PLAIN_ERROR, SLAB, STEEPEST};
 use super::wide::{LEAF, Wide, WideNode, near_rows};
 use crate::{Interval, Ray};
-use fearless_simd::{Simd, f32x8, f64x4, i32x8, mask32x8, prelude::*, u8x32};
+use fearless_simd::{Simd, f32x8, f32x16, f64x8, i32x8, mask32x8, prelude::*, u8x32};
 
 /// How many rays a bundle has.
 pub(crate) const RAYS: usize = 32;
 
 /// And in how many vectors.
-pub(crate) const EIGHTS: usize = RAYS / 8;
+pub(crate) const SIXTEENS: usize = RAYS / 16;
 
 /// Bundles wider than this, in directions over their length and in origins over the tree's size, would visit much that
 /// none of their rays meets. Rays from one place share enough without it.
@@ -56,41 +56,80 @@ pub(crate) enum Start {
     End,
 }
 
-/// Eight rays, by lane, in the tree's frame as [`LocalRay`](super::LocalRay) has them.
+/// Sixteen rays, by lane, in the tree's frame as [`LocalRay`](super::LocalRay) has them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Eight {
-    pub(crate) origin: [[f32; 8]; 3],
-    pub(crate) direction: [[f32; 8]; 3],
-    inv: [[f32; 8]; 3],
-    near_shift: [[f32; 8]; 3],
-    far_shift: [[f32; 8]; 3],
-    pub(crate) t_min: [f32; 8],
+#[repr(align(64))]
+pub(crate) struct Sixteen {
+    pub(crate) direction: [[f32; 16]; 3],
+    pub(crate) origin: [[f32; 16]; 3],
+    inv: [[f32; 16]; 3],
+    near_shift: [[f32; 16]; 3],
+    far_shift: [[f32; 16]; 3],
+    pub(crate) t_min: [f32; 16],
     /// −∞ for a ray that has its answer.
-    pub(crate) t_max: [f32; 8],
+    pub(crate) t_max: [f32; 16],
     /// What lies between these is certainly inside the ray's interval.
-    pub(crate) sure_min: [f32; 8],
-    pub(crate) sure_max: [f32; 8],
+    pub(crate) sure_min: [f32; 16],
+    pub(crate) sure_max: [f32; 16],
 }
 
-/// Four numbers each of eight rays, two rays a vector: the numbers by ray.
+/// Eight numbers each of sixteen rays, two rays a vector: the numbers by ray.
 #[inline(always)]
-fn columns<S: Simd>([a, b, c, d]: [f32x8<S>; 4]) -> [f32x8<S>; 4] {
-    let ((xz_low, yw_low), (xz_high, yw_high)) = (a.deinterleave(b), c.deinterleave(d));
-    let ((x, z), (y, w)) = (xz_low.deinterleave(xz_high), yw_low.deinterleave(yw_high));
-    [x, y, z, w]
+fn columns<S: Simd>(rows: [f32x16<S>; 8]) -> [f32x16<S>; 8] {
+    let [a, b, c, d, e, f, g, h] = rows;
+    // Every other number: the even ones and the odd, of four rays each; then every fourth, of eight; every eighth.
+    let ((a, i), (c, j), (e, k), (g, l)) = (a.deinterleave(b), c.deinterleave(d), e.deinterleave(f), g.deinterleave(h));
+    let ((a, c), (e, g)) = (a.deinterleave(c), e.deinterleave(g));
+    let ((i, j), (k, l)) = (i.deinterleave(j), k.deinterleave(l));
+    let ((x0, x4), (x2, x6)) = (a.deinterleave(e), c.deinterleave(g));
+    let ((x1, x5), (x3, x7)) = (i.deinterleave(k), j.deinterleave(l));
+    [x0, x1, x2, x3, x4, x5, x6, x7]
 }
 
-impl Eight {
+/// What a bundle's bounds are made of: numbers of two rays a vector, as they lie in memory.
+struct Extent<S: Simd> {
+    least: f32x16<S>,
+    most: f32x16<S>,
+    sum: f32x16<S>,
+}
+
+impl<S: Simd> Extent<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        let [least, most] = [f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, f32::NEG_INFINITY)];
+        Self { least, most, sum: f32x16::splat(simd, 0.0) }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, two: f32x16<S>) {
+        (self.least, self.most, self.sum) = (self.least.min(two), self.most.max(two), self.sum + two);
+    }
+
+    /// The least and the greatest origin and direction, and whether all of them are finite.
+    #[inline(always)]
+    fn of_all(&self) -> ([[f32; 2]; 3], [[f32; 2]; 3], bool) {
+        let ((least, least_of_others), (most, most_of_others)) = (self.least.split(), self.most.split());
+        let (least, most) = (least.min(least_of_others), most.max(most_of_others));
+        let (least, most): ([f32; 8], [f32; 8]) = (least.into(), most.into());
+        let of = |i: usize| [least[i], most[i]];
+        // Sums of a NaN or an infinity with others are one. Of the limits, the last two of each ray, nothing is asked.
+        let (sum, sum_of_others) = self.sum.split();
+        let finite = (sum + sum_of_others).is_finite().to_bitmask() & 0x3f == 0x3f;
+        ([of(0), of(1), of(2)], [of(3), of(4), of(5)], finite)
+    }
+}
+
+impl Sixteen {
     const EMPTY: Self = Self {
-        origin: [[0.0; 8]; 3],
-        direction: [[0.0; 8]; 3],
-        inv: [[0.0; 8]; 3],
-        near_shift: [[0.0; 8]; 3],
-        far_shift: [[0.0; 8]; 3],
-        t_min: [0.0; 8],
-        t_max: [0.0; 8],
-        sure_min: [0.0; 8],
-        sure_max: [0.0; 8],
+        direction: [[0.0; 16]; 3],
+        origin: [[0.0; 16]; 3],
+        inv: [[0.0; 16]; 3],
+        near_shift: [[0.0; 16]; 3],
+        far_shift: [[0.0; 16]; 3],
+        t_min: [0.0; 16],
+        t_max: [0.0; 16],
+        sure_min: [0.0; 16],
+        sure_max: [0.0; 16],
     };
 
     /// Takes the rays into the frame, as [`LocalRay::new`](super::LocalRay::new) takes those that it takes as they are. Returns the
@@ -101,47 +140,47 @@ impl Eight {
         &mut self,
         simd: S,
         frame: &Frame,
-        rays: &[(Ray, Interval); 8],
+        rays: &[(Ray, Interval); 16],
         from: Start,
-    ) -> ([f32x8<S>; 2], bool) {
-        let scale = frame.scale;
-        let center = f64x4::simd_from(simd, [frame.center.x, frame.center.y, frame.center.z, 0.0]);
-        let to_frame = [f64x4::splat(simd, scale), f64x4::simd_from(simd, [scale, scale, 1.0, 1.0])];
-        let back = f64x4::simd_from(simd, [scale, scale, scale, 0.0]);
-        let mut halves = [[f32x8::splat(simd, 0.0); 4]; 2];
-        for i in 0..4 {
-            let [mut first, mut second] = [[f64x4::splat(simd, 0.0); 2]; 2];
+        extent: &mut Extent<S>,
+    ) -> ([f32x16<S>; 2], bool) {
+        let (c, s) = (frame.center, frame.scale);
+        let center = f64x8::simd_from(simd, [c.x, c.y, c.z, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let to_frame = f64x8::simd_from(simd, [s, s, s, s, s, s, 1.0, 1.0]);
+        let back = f64x8::simd_from(simd, [s, s, s, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let mut rows = [f32x16::splat(simd, 0.0); 8];
+        for (i, row) in rows.iter_mut().enumerate() {
+            let mut both = [f64x8::splat(simd, 0.0); 2];
             for k in 0..2 {
                 let (Ray { origin: o, direction: d }, Interval { min, max }) = rays[2 * i + k];
-                first[k] = (f64x4::simd_from(simd, [o.x, o.y, o.z, d.x]) - center) * to_frame[0];
-                second[k] = f64x4::simd_from(simd, [d.y, d.z, min, max]) * to_frame[1];
+                both[k] = (f64x8::simd_from(simd, [o.x, o.y, o.z, d.x, d.y, d.z, min, max]) - center) * to_frame;
                 if from == Start::End {
-                    first[k] += f64x4::simd_from(simd, [d.x, d.y, d.z, 0.0]) * (back * max);
+                    both[k] += f64x8::simd_from(simd, [d.x, d.y, d.z, 0.0, 0.0, 0.0, 0.0, 0.0]) * (back * max);
                 }
             }
-            halves[0][i] = first[0].relaxed_narrow(first[1]);
-            halves[1][i] = second[0].relaxed_narrow(second[1]);
+            *row = both[0].relaxed_narrow(both[1]);
+            extent.add(*row);
         }
-        let ([ox, oy, oz, dx], [dy, dz, min, max]) = (columns(halves[0]), columns(halves[1]));
+        let [ox, oy, oz, dx, dy, dz, min, max] = columns(rows);
         // A NaN is below nothing.
-        let long = min.simd_lt(max).to_bitmask() == 0xff;
-        let farthest = f32x8::splat(simd, FARTHEST_T);
+        let long = min.simd_lt(max).to_bitmask() == 0xffff;
+        let farthest = f32x16::splat(simd, FARTHEST_T);
         let (min, max) = (min.min(farthest).max(-farthest), max.min(farthest).max(-farthest));
-        let (rounding, tiny) = (f32x8::splat(simd, 4.0 * E), f32x8::splat(simd, TINY));
+        let (rounding, tiny) = (f32x16::splat(simd, 4.0 * E), f32x16::splat(simd, TINY));
         let slack = [min.abs().mul_add(rounding, tiny), max.abs().mul_add(rounding, tiny)];
         let (o, mut d) = ([ox, oy, oz], [dx, dy, dz]);
         let (mut ends, mut slacks, mut error) = ([min, max], slack, PLAIN_ERROR);
         if from == Start::End {
             d = [-dx, -dy, -dz];
-            ends = [f32x8::splat(simd, 0.0), max - min];
+            ends = [f32x16::splat(simd, 0.0), max - min];
             slacks = [tiny, slack[0] + slack[1]];
             error = BACK_ERROR;
         }
-        let (one, steepest) = (f32x8::splat(simd, 1.0), f32x8::splat(simd, STEEPEST));
+        let (one, steepest) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, STEEPEST));
         for axis in 0..3 {
             let (o, d) = (o[axis], d[axis]);
             let slope = d.abs().simd_lt(1.0 / STEEPEST).select(steepest, one / d);
-            let pad = o.abs().mul_add(f32x8::splat(simd, SLAB), f32x8::splat(simd, SLAB + 2.0 * error));
+            let pad = o.abs().mul_add(f32x16::splat(simd, SLAB), f32x16::splat(simd, SLAB + 2.0 * error));
             let (middle, half) = (o * slope, slope.abs() * pad);
             (self.origin[axis], self.direction[axis], self.inv[axis]) = (o.into(), d.into(), slope.into());
             (self.near_shift[axis], self.far_shift[axis]) = ((-middle - half).into(), (half - middle).into());
@@ -153,44 +192,44 @@ impl Eight {
     }
 
     #[inline(always)]
-    fn slab<S: Simd>(&self, simd: S, axis: usize) -> (f32x8<S>, f32x8<S>, f32x8<S>) {
+    fn slab<S: Simd>(&self, simd: S, axis: usize) -> (f32x16<S>, f32x16<S>, f32x16<S>) {
         (self.inv[axis].simd_into(simd), self.near_shift[axis].simd_into(simd), self.far_shift[axis].simd_into(simd))
     }
 
     /// The rays that may meet the box of lane `lane`; `near` as of [`near_rows`].
     #[inline(always)]
     fn meet<S: Simd>(&self, simd: S, node: &WideNode, lane: usize, near: &[u32; 3]) -> u32 {
-        let (mut enter, mut exit): (f32x8<S>, f32x8<S>) = (self.t_min.simd_into(simd), self.t_max.simd_into(simd));
+        let (mut enter, mut exit): (f32x16<S>, f32x16<S>) = (self.t_min.simd_into(simd), self.t_max.simd_into(simd));
         for (axis, &row) in near.iter().enumerate() {
             let row = row as usize & 7;
-            let first = f32x8::splat(simd, node.rows[row][lane & 7]);
-            let last = f32x8::splat(simd, node.rows[row ^ 1][lane & 7]);
+            let first = f32x16::splat(simd, node.rows[row][lane & 7]);
+            let last = f32x16::splat(simd, node.rows[row ^ 1][lane & 7]);
             let (inv, near_shift, far_shift) = self.slab(simd, axis);
             enter = enter.max(first.mul_add(inv, near_shift));
             exit = exit.min(last.mul_add(inv, far_shift));
         }
-        !(enter.simd_gt(exit).to_bitmask() as u32) & 0xff
+        !(enter.simd_gt(exit).to_bitmask() as u32) & 0xffff
     }
 
     /// The same where the rays go either way.
     #[inline(always)]
     fn meet_mixed<S: Simd>(&self, simd: S, node: &WideNode, lane: usize) -> u32 {
-        let (mut enter, mut exit): (f32x8<S>, f32x8<S>) = (self.t_min.simd_into(simd), self.t_max.simd_into(simd));
+        let (mut enter, mut exit): (f32x16<S>, f32x16<S>) = (self.t_min.simd_into(simd), self.t_max.simd_into(simd));
         for axis in 0..3 {
             let (inv, near_shift, far_shift) = self.slab(simd, axis);
-            let low = f32x8::splat(simd, node.rows[2 * axis][lane & 7]) * inv;
-            let high = f32x8::splat(simd, node.rows[2 * axis + 1][lane & 7]) * inv;
+            let low = f32x16::splat(simd, node.rows[2 * axis][lane & 7]) * inv;
+            let high = f32x16::splat(simd, node.rows[2 * axis + 1][lane & 7]) * inv;
             enter = enter.max(low.min(high) + near_shift);
             exit = exit.min(low.max(high) + far_shift);
         }
-        !(enter.simd_gt(exit).to_bitmask() as u32) & 0xff
+        !(enter.simd_gt(exit).to_bitmask() as u32) & 0xffff
     }
 }
 
 /// Rays and the bounds of them all, rounded outward.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bundle {
-    pub(crate) rays: [Eight; EIGHTS],
+    pub(crate) rays: [Sixteen; SIXTEENS],
     /// Where all rays start, but for [`origin_error`](Self::origin_error), if they do.
     pub(crate) place: Option<[f32; 3]>,
     /// Bit i: the directions' coordinates i are negative.
@@ -217,7 +256,7 @@ pub(crate) struct Bundle {
 
 /// The least and the greatest of all lanes.
 #[inline(always)]
-fn range<S: Simd>(vectors: [f32x8<S>; EIGHTS]) -> [f32; 2] {
+fn range<S: Simd>(vectors: [f32x16<S>; SIXTEENS]) -> [f32; 2] {
     let (mut least, mut most) = (vectors[0], vectors[0]);
     for vector in &vectors[1..] {
         (least, most) = (least.min(*vector), most.max(*vector));
@@ -233,7 +272,7 @@ fn largest([low, high]: [f32; 2]) -> f32 {
 impl Bundle {
     /// None that is of use.
     pub(crate) const EMPTY: Self = Self {
-        rays: [Eight::EMPTY; EIGHTS],
+        rays: [Sixteen::EMPTY; SIXTEENS],
         place: None,
         away: 0,
         mixed: false,
@@ -263,27 +302,22 @@ impl Bundle {
         (self.near_origin, self.far_origin) = ([FAR; 3], [-FAR; 3]);
         self.inverse = [[1.0; 3]; 2];
         // No closures over vectors here and below: one that is not inlined makes calls of all that it does.
-        let (eights, _) = rays.as_chunks::<8>();
-        let zero = f32x8::splat(simd, 0.0);
-        let [mut lengths, mut ways, mut t_min, mut t_max] = [[zero; EIGHTS]; 4];
-        let mut long = true;
-        for i in 0..EIGHTS {
-            let eight = &mut self.rays[i];
-            let ([length, way], all_long) = eight.set(simd, frame, &eights[i], from);
+        let (sixteens, _) = rays.as_chunks::<16>();
+        let zero = f32x16::splat(simd, 0.0);
+        let [mut lengths, mut ways, mut t_min, mut t_max] = [[zero; SIXTEENS]; 4];
+        let (mut long, mut extent) = (true, Extent::new(simd));
+        for i in 0..SIXTEENS {
+            let sixteen = &mut self.rays[i];
+            let ([length, way], all_long) = sixteen.set(simd, frame, &sixteens[i], from, &mut extent);
             (lengths[i], ways[i]) = (length, way);
-            (t_min[i], t_max[i]) = (eight.t_min.simd_into(simd), eight.t_max.simd_into(simd));
+            (t_min[i], t_max[i]) = (sixteen.t_min.simd_into(simd), sixteen.t_max.simd_into(simd));
             long &= all_long;
         }
-        // Sums of a NaN or an infinity with others are one, and fail the comparisons below.
-        let mut sum = zero;
-        let [mut origins, mut directions] = [[[0.0; 2]; 3]; 2];
-        for axis in 0..3 {
-            let [mut o, mut d] = [[zero; EIGHTS]; 2];
-            for (i, eight) in self.rays.iter().enumerate() {
-                (o[i], d[i]) = (eight.origin[axis].simd_into(simd), eight.direction[axis].simd_into(simd));
-                sum += o[i] + d[i];
+        let (origins, mut directions, finite) = extent.of_all();
+        if from == Start::End {
+            for [low, high] in &mut directions {
+                (*low, *high) = (-*high, -*low);
             }
-            (origins[axis], directions[axis]) = (range(o), range(d));
         }
         self.lengths = range(lengths);
         ([self.t_min, _], [_, self.t_max]) = (range(t_min), range(t_max));
@@ -304,7 +338,7 @@ impl Bundle {
         };
         let plain = (size <= farthest) & (self.lengths[0] >= shortest) & (self.lengths[1] <= LENGTHS[1]);
         let ends = (from == Start::Origin) || one_place & (range(ways)[1] <= FARTHEST_WAY);
-        if !(long & plain & alike & ends & sum.reduce_sum().is_finite()) {
+        if !(long & plain & alike & ends & finite) {
             return false;
         }
         self.place = one_place.then_some([origins[0][0], origins[1][0], origins[2][0]]);
@@ -336,27 +370,25 @@ impl Bundle {
     /// Which rays may meet the box of lane `lane`.
     #[inline(always)]
     fn meet<S: Simd>(&self, simd: S, node: &WideNode, lane: usize, near: &[u32; 3]) -> u32 {
-        let mut met = 0;
-        for (i, eight) in self.rays.iter().enumerate() {
-            let of_eight =
-                if self.mixed { eight.meet_mixed(simd, node, lane) } else { eight.meet(simd, node, lane, near) };
-            met |= of_eight << (8 * i);
+        let [a, b] = &self.rays;
+        if self.mixed {
+            return a.meet_mixed(simd, node, lane) | b.meet_mixed(simd, node, lane) << 16;
         }
-        met
+        a.meet(simd, node, lane, near) | b.meet(simd, node, lane, near) << 16
     }
 
     /// The ray has its answer.
     #[inline(always)]
     pub(crate) fn end(&mut self, ray: usize) {
-        self.rays[ray / 8 % EIGHTS].t_max[ray % 8] = f32::NEG_INFINITY;
+        self.rays[ray / 16 % SIXTEENS].t_max[ray % 16] = f32::NEG_INFINITY;
     }
 
     /// Keeps the largest t that matters, after one of the rays' has changed.
     #[inline(always)]
     pub(crate) fn shorten<S: Simd>(&mut self, simd: S) {
-        let mut last: f32x8<S> = self.rays[0].t_max.simd_into(simd);
-        for eight in &self.rays[1..] {
-            last = last.max(f32x8::simd_from(simd, eight.t_max));
+        let mut last: f32x16<S> = self.rays[0].t_max.simd_into(simd);
+        for sixteen in &self.rays[1..] {
+            last = last.max(f32x16::simd_from(simd, sixteen.t_max));
         }
         self.t_max = last.reduce_max();
     }

@@ -24,7 +24,7 @@ mod wide;
 
 pub use level::Level;
 
-pub(crate) use bundle::{Bundle, EIGHTS, Eight, RAYS, Start, Together, together};
+pub(crate) use bundle::{Bundle, RAYS, SIXTEENS, Sixteen, Start, Together, together};
 pub(crate) use collapse::build;
 pub(crate) use frame::{Frame, FrameBox};
 pub(crate) use slab::{E, Limits, LocalRay, Sure};

@@ -2,13 +2,13 @@
 //! are those of each ray alone.
 
 use super::Mesh;
-use super::leaf::{Margins, Spot, Verdict, filter};
+use super::leaf::{Margins, OfEight, Spot, filter};
 use super::query::{self, exactly, nearer, occluded};
-use super::seen::{Seen, View, everywhere};
+use super::seen::{OfSixteen, Seen, View, everywhere};
 use super::settle::settle;
-use crate::bvh::{self, Bundle, EIGHTS, Limits, RAYS, Start};
+use crate::bvh::{self, Bundle, Limits, RAYS, SIXTEENS, Start};
 use crate::{Hit, Interval, Ray};
-use fearless_simd::{Simd, dispatch, f32x8, mask32x8, prelude::*, u32x8};
+use fearless_simd::{Simd, dispatch, f32x8, f32x16, mask32x16, prelude::*, u32x16};
 use glam::DVec3;
 
 /// A ray and the stretch of it that counts.
@@ -20,7 +20,7 @@ pub(super) fn closest(mesh: &Mesh, rays: &[Stretch], hits: &mut [Option<Hit>]) {
     each(
         rays,
         hits,
-        |rays, hits| dispatch!(mesh.level.token(), simd => closest_with(simd, mesh, rays, &mut bundle, hits)),
+        |rays, hits| dispatch!(mesh.level.of_many(), simd => closest_with(simd, mesh, rays, &mut bundle, hits)),
         |(ray, within)| query::closest(mesh, ray, *within),
     );
 }
@@ -31,7 +31,7 @@ pub(super) fn any(mesh: &Mesh, rays: &[Stretch], hits: &mut [bool]) {
     each(
         rays,
         hits,
-        |rays, hits| dispatch!(mesh.level.token(), simd => any_with(simd, mesh, rays, &mut bundle, hits)),
+        |rays, hits| dispatch!(mesh.level.of_many(), simd => any_with(simd, mesh, rays, &mut bundle, hits)),
         |(ray, within)| query::any(mesh, ray, *within),
     );
 }
@@ -99,8 +99,8 @@ struct Walk<'a, A> {
 
 /// What a bundle's rays want to know.
 trait Answers<S: Simd>: Sized {
-    /// Considers a triangle for those of eight rays that have a bit in `rays`, and answers which of them need no more.
-    fn of_eight(walk: &mut Walk<Self>, simd: S, spot: Spot, eight: usize, rays: u32, verdict: &Verdict<S>) -> u32;
+    /// Considers a triangle for sixteen rays, and answers which of them need no more.
+    fn of_sixteen(walk: &mut Walk<Self>, simd: S, spot: Spot, sixteen: usize, verdict: &OfSixteen<S>) -> u32;
 
     /// Considers a triangle for one ray, which may pass it between the t of `depth`; `through`: certainly passes through its
     /// inside. `true` if the ray needs no more.
@@ -111,10 +111,10 @@ impl<'a, A> Walk<'a, A> {
     #[inline(always)]
     fn new<S: Simd>(simd: S, mesh: &'a Mesh, rays: &'a [Stretch; RAYS], bundle: &'a mut Bundle, answers: A) -> Self {
         let (margins, reach) = Margins::of_bundle(bundle);
-        let reach = f32x8::splat(simd, reach);
-        for eight in &mut bundle.rays {
-            let (t_min, t_max): (f32x8<S>, f32x8<S>) = (eight.t_min.simd_into(simd), eight.t_max.simd_into(simd));
-            (eight.t_min, eight.t_max) = (t_min.max(-reach).into(), t_max.min(reach).into());
+        let reach = f32x16::splat(simd, reach);
+        for rays in &mut bundle.rays {
+            let (t_min, t_max): (f32x16<S>, f32x16<S>) = (rays.t_min.simd_into(simd), rays.t_max.simd_into(simd));
+            (rays.t_min, rays.t_max) = (t_min.max(-reach).into(), t_max.min(reach).into());
         }
         Self { mesh, rays, view: View::of(bundle), bundle, margins, answers }
     }
@@ -128,12 +128,11 @@ impl<'a, A> Walk<'a, A> {
         let triangles = self.mesh.leaves[number as usize].triangles(simd, self.mesh.exact);
         let seen = Seen::new(simd, &triangles, view, &self.margins);
         let mut lanes = if rays.count_ones() <= FEW { 0xff } else { seen.lanes(simd, view) };
-        let eights = (0..EIGHTS).filter(|eight| rays >> (8 * eight) & 0xff != 0).count() as u32;
-        if rays.count_ones() <= lanes.count_ones() * eights {
+        if rays.count_ones() <= lanes.count_ones() * SIXTEENS as u32 {
             while rays != 0 {
                 let ray = rays.trailing_zeros() as usize % RAYS;
                 rays &= rays - 1;
-                if let Some(verdict) = seen.ray(simd, &self.bundle.rays[ray / 8], ray % 8) {
+                if let Some(verdict) = seen.ray(simd, &self.bundle.rays[ray / 16], ray % 16) {
                     self.of_ray(simd, number, ray, &verdict);
                 }
             }
@@ -142,14 +141,11 @@ impl<'a, A> Walk<'a, A> {
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
-            for eight in 0..EIGHTS {
-                let of_these = rays >> (8 * eight) & 0xff;
-                if of_these == 0 {
-                    continue;
-                }
-                let Some(verdict) = seen.triangle(simd, lane as usize, &self.bundle.rays[eight]) else { continue };
-                let done = A::of_eight(self, simd, Spot { leaf: number, lane }, eight, of_these, &verdict);
-                rays &= !(done << (8 * eight));
+            for sixteen in 0..SIXTEENS {
+                let asked = rays >> (16 * sixteen) & 0xffff;
+                let Some(verdict) = seen.triangle(simd, lane as usize, &self.bundle.rays[sixteen], asked) else { continue };
+                let done = A::of_sixteen(self, simd, Spot { leaf: number, lane }, sixteen, &verdict);
+                rays &= !(done << (16 * sixteen));
             }
         }
     }
@@ -164,9 +160,9 @@ impl<'a, A> Walk<'a, A> {
         while rays != 0 {
             let ray = rays.trailing_zeros() as usize % RAYS;
             rays &= rays - 1;
-            let (eight, at) = (&self.bundle.rays[ray / 8], ray % 8);
-            let [o, d] = [everywhere(simd, &eight.origin, at), everywhere(simd, &eight.direction, at)];
-            let stretch = [f32x8::splat(simd, eight.t_min[at]), f32x8::splat(simd, eight.t_max[at])];
+            let (sixteen, at) = (&self.bundle.rays[ray / 16], ray % 16);
+            let [o, d] = [everywhere(simd, &sixteen.origin, at), everywhere(simd, &sixteen.direction, at)];
+            let stretch = [f32x8::splat(simd, sixteen.t_min[at]), f32x8::splat(simd, sixteen.t_max[at])];
             if let Some(verdict) = filter(simd, &triangles, [o, d], &self.margins, stretch) {
                 self.of_ray(simd, number, ray, &verdict);
             }
@@ -175,7 +171,7 @@ impl<'a, A> Walk<'a, A> {
 
     /// What one ray meets in a leaf.
     #[inline(always)]
-    fn of_ray<S: Simd>(&mut self, simd: S, leaf: u32, ray: usize, verdict: &Verdict<S>)
+    fn of_ray<S: Simd>(&mut self, simd: S, leaf: u32, ray: usize, verdict: &OfEight<S>)
     where
         A: Answers<S>,
     {
@@ -218,8 +214,8 @@ impl<S: Simd, A: Answers<S>> bvh::Together<S> for Walk<'_, A> {
 
 /// The lanes whose triangles are met inside their rays' intervals, for certain.
 #[inline(always)]
-fn certain<S: Simd>(simd: S, eight: &bvh::Eight, verdict: &Verdict<S>) -> mask32x8<S> {
-    let (min, max): (f32x8<S>, f32x8<S>) = (eight.sure_min.simd_into(simd), eight.sure_max.simd_into(simd));
+fn certain<S: Simd>(simd: S, rays: &bvh::Sixteen, verdict: &OfSixteen<S>) -> mask32x16<S> {
+    let (min, max): (f32x16<S>, f32x16<S>) = (rays.sure_min.simd_into(simd), rays.sure_max.simd_into(simd));
     verdict.through & verdict.low.simd_gt(min) & verdict.high.simd_lt(max)
 }
 
@@ -237,8 +233,8 @@ fn closest_with<S: Simd>(
     }
     *hits = [None; RAYS];
     let nearests = Nearests {
-        low: [[f32::INFINITY; 8]; EIGHTS],
-        spot: [[Spot::NOWHERE; 8]; EIGHTS],
+        low: [[f32::INFINITY; 16]; SIXTEENS],
+        spot: [[Spot::NOWHERE; 16]; SIXTEENS],
         remembered: 0,
         settled: 0,
         hits,
@@ -253,9 +249,9 @@ fn closest_with<S: Simd>(
 /// not be told from it is settled in f64 at once; λ of what remains when the walk has ended.
 struct Nearests<'a> {
     /// Not above t of the triangle that is remembered, at `spot`; t_max is not below.
-    low: [[f32; 8]; EIGHTS],
+    low: [[f32; 16]; SIXTEENS],
     /// Leaf and lane.
-    spot: [[u32; 8]; EIGHTS],
+    spot: [[u32; 16]; SIXTEENS],
     /// The rays that have one remembered, and those that have one settled.
     remembered: u32,
     settled: u32,
@@ -265,40 +261,40 @@ struct Nearests<'a> {
 
 impl<S: Simd> Answers<S> for Nearests<'_> {
     #[inline(always)]
-    fn of_eight(walk: &mut Walk<Self>, simd: S, spot: Spot, eight: usize, asked: u32, verdict: &Verdict<S>) -> u32 {
-        let rays = &mut walk.bundle.rays[eight];
-        let [low, t_max]: [f32x8<S>; 2] = [walk.answers.low[eight].simd_into(simd), rays.t_max.simd_into(simd)];
+    fn of_sixteen(walk: &mut Walk<Self>, simd: S, spot: Spot, sixteen: usize, verdict: &OfSixteen<S>) -> u32 {
+        let rays = &mut walk.bundle.rays[sixteen];
+        let [low, t_max]: [f32x16<S>; 2] = [walk.answers.low[sixteen].simd_into(simd), rays.t_max.simd_into(simd)];
         let nearer = certain(simd, rays, verdict) & verdict.high.simd_lt(low);
         let farther = verdict.through & verdict.low.simd_gt(t_max);
-        let spots = nearer.select(u32x8::splat(simd, spot.packed()), walk.answers.spot[eight].simd_into(simd));
-        walk.answers.spot[eight] = spots.into();
-        walk.answers.low[eight] = nearer.select(verdict.low, low).into();
+        let spots = nearer.select(u32x16::splat(simd, spot.packed()), walk.answers.spot[sixteen].simd_into(simd));
+        walk.answers.spot[sixteen] = spots.into();
+        walk.answers.low[sixteen] = nearer.select(verdict.low, low).into();
         rays.t_max = nearer.select(verdict.high.min(t_max), t_max).into();
-        walk.answers.remembered |= (nearer.to_bitmask() as u32) << (8 * eight);
-        let mut open = verdict.maybe & asked & !((nearer | farther).to_bitmask() as u32);
+        walk.answers.remembered |= (nearer.to_bitmask() as u32) << (16 * sixteen);
+        let mut open = verdict.maybe & !((nearer | farther).to_bitmask() as u32);
         while open != 0 {
             let lane = open.trailing_zeros() as usize;
             open &= open - 1;
-            walk.confirm(simd, spot, 8 * eight + lane);
+            walk.confirm(simd, spot, 16 * sixteen + lane);
         }
         0
     }
 
     #[inline(always)]
     fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, [low, high]: [f32; 2]) -> bool {
-        let (eight, lane) = (&mut walk.bundle.rays[ray / 8], ray % 8);
-        let t_max = &mut eight.t_max[lane];
+        let (rays, lane) = (&mut walk.bundle.rays[ray / 16], ray % 16);
+        let t_max = &mut rays.t_max[lane];
         if through && low > *t_max {
             return false;
         }
-        let of_ray = &mut walk.answers.low[ray / 8][lane];
-        if !(through & (low > eight.sure_min[lane]) & (high < eight.sure_max[lane]) & (high < *of_ray)) {
+        let of_ray = &mut walk.answers.low[ray / 16][lane];
+        if !(through & (low > rays.sure_min[lane]) & (high < rays.sure_max[lane]) & (high < *of_ray)) {
             walk.confirm(simd, spot, ray);
             return false;
         }
         *of_ray = low;
         walk.answers.remembered |= 1 << ray;
-        walk.answers.spot[ray / 8][lane] = spot.packed();
+        walk.answers.spot[ray / 16][lane] = spot.packed();
         if high < *t_max {
             *t_max = high;
         }
@@ -320,7 +316,7 @@ impl Walk<'_, Nearests<'_>> {
                 self.answers.settled |= 1 << ray;
                 let (t, t_max) = (
                     Limits::PLAIN.upper(best.lambda + best.error),
-                    &mut self.bundle.rays[ray / 8 % EIGHTS].t_max[ray % 8],
+                    &mut self.bundle.rays[ray / 16 % SIXTEENS].t_max[ray % 16],
                 );
                 if t < *t_max {
                     *t_max = t;
@@ -337,8 +333,8 @@ impl Walk<'_, Nearests<'_>> {
         while both != 0 {
             let ray = both.trailing_zeros() as usize % RAYS;
             both &= both - 1;
-            if low[ray / 8][ray % 8] <= self.bundle.rays[ray / 8].t_max[ray % 8] {
-                self.confirm(simd, Spot::of(spot[ray / 8][ray % 8]), ray);
+            if low[ray / 16][ray % 16] <= self.bundle.rays[ray / 16].t_max[ray % 16] {
+                self.confirm(simd, Spot::of(spot[ray / 16][ray % 16]), ray);
             }
         }
         settle(simd, self.mesh, self.rays, remembered & !settled, spot.as_flattened(), self.answers.hits);
@@ -372,14 +368,14 @@ struct Until<'a> {
 
 impl<S: Simd> Answers<S> for Until<'_> {
     #[inline(always)]
-    fn of_eight(walk: &mut Walk<Self>, simd: S, spot: Spot, eight: usize, rays: u32, verdict: &Verdict<S>) -> u32 {
-        let certain = certain(simd, &walk.bundle.rays[eight], verdict).to_bitmask() as u32;
-        let maybe = verdict.maybe & rays;
+    fn of_sixteen(walk: &mut Walk<Self>, simd: S, spot: Spot, sixteen: usize, verdict: &OfSixteen<S>) -> u32 {
+        let certain = certain(simd, &walk.bundle.rays[sixteen], verdict).to_bitmask() as u32;
+        let maybe = verdict.maybe;
         let (mut met, mut open) = (maybe & certain, maybe & !certain);
         while open != 0 {
             let lane = open.trailing_zeros() as usize;
             open &= open - 1;
-            if walk.meets(simd, spot, 8 * eight + lane) {
+            if walk.meets(simd, spot, 16 * sixteen + lane) {
                 met |= 1 << lane;
             }
         }
@@ -387,15 +383,15 @@ impl<S: Simd> Answers<S> for Until<'_> {
         while answered != 0 {
             let lane = answered.trailing_zeros() as usize;
             answered &= answered - 1;
-            walk.end(8 * eight + lane);
+            walk.end(16 * sixteen + lane);
         }
         met
     }
 
     #[inline(always)]
     fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, [low, high]: [f32; 2]) -> bool {
-        let (eight, lane) = (&walk.bundle.rays[ray / 8], ray % 8);
-        let met = through & (low > eight.sure_min[lane]) & (high < eight.sure_max[lane]) || walk.meets(simd, spot, ray);
+        let (rays, lane) = (&walk.bundle.rays[ray / 16], ray % 16);
+        let met = through & (low > rays.sure_min[lane]) & (high < rays.sure_max[lane]) || walk.meets(simd, spot, ray);
         if met {
             walk.end(ray);
         }

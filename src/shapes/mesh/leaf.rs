@@ -225,78 +225,92 @@ pub(super) fn filter<S: Simd>(
     [o, d]: [Vec8<S>; 2],
     margins: &Margins,
     [t_min, last]: [f32x8<S>; 2],
-) -> Option<Verdict<S>> {
+) -> Option<OfEight<S>> {
     let &Triangles { v0, e1, e2, size } = triangles;
     let c = minus(v0, o);
     let r = cross(c, d);
     let n = cross(e1, e2);
     let det = dot(n, d);
-    let sides = Sides::new([dot(r, e2), -dot(r, e1)], det, margins.edges(simd, size))?;
+    let sides = Sides::new([dot(r, e2), -dot(r, e1)], det, margins.edges(simd, size), 0xff)?;
     sides.verdict(simd, [dot(n, c), det], margins.depth(simd, size, c, n), [t_min, last])
 }
 
 /// On which sides of the triangle's edges a line passes, as far as is certain.
-pub(super) struct Sides<S: Simd> {
-    outside: u32,
-    through: mask32x8<S>,
+pub(super) struct Sides<M> {
+    maybe: u32,
+    through: M,
 }
 
-impl<S: Simd> Sides<S> {
-    /// From the edge functions and what they may be off by; `None` if all lines are certain to pass outside.
+impl<M> Sides<M> {
+    /// From the edge functions and what they may be off by, of the lanes `asked` for; `None` if all those lines are certain to
+    /// pass outside.
     #[inline(always)]
-    pub(super) fn new([u, v]: [f32x8<S>; 2], det: f32x8<S>, margin: f32x8<S>) -> Option<Self> {
+    pub(super) fn new<S, V>([u, v]: [V; 2], det: V, margin: V, asked: u32) -> Option<Self>
+    where
+        S: Simd,
+        V: SimdFloat<S, Element = f32, Mask = M>,
+        M: SimdMask<S>,
+    {
         let w = det - u - v;
         // Certainly a miss: one edge function above zero, another below. An empty lane has a negative margin.
         let least = u.min(v.min(w));
         let most = u.max(v.max(w));
-        let outside = (least.simd_lt(-margin) & most.simd_gt(margin)).to_bitmask() as u32;
-        if outside == 0xff {
+        let maybe = asked & !((least.simd_lt(-margin) & most.simd_gt(margin)).to_bitmask() as u32);
+        if maybe == 0 {
             return None;
         }
         // Certainly through: all three above zero, or all below.
-        Some(Self { outside, through: least.simd_gt(margin) | most.simd_lt(-margin) })
+        Some(Self { maybe, through: least.simd_gt(margin) | most.simd_lt(-margin) })
     }
 
     /// What follows with t's numerator and denominator and what they may be off by; `None` if all are certain misses.
     #[inline(always)]
-    pub(super) fn verdict(
+    pub(super) fn verdict<S, V>(
         self,
         simd: S,
-        [t, det]: [f32x8<S>; 2],
-        (of_t, of_det): (f32x8<S>, f32x8<S>),
-        [t_min, last]: [f32x8<S>; 2],
-    ) -> Option<Verdict<S>> {
+        [t, det]: [V; 2],
+        (of_t, of_det): (V, V),
+        [t_min, last]: [V; 2],
+    ) -> Option<Verdict<V, M>>
+    where
+        S: Simd,
+        V: SimdFloat<S, Element = f32, Mask = M>,
+        M: SimdMask<S>,
+    {
         // The sign of det goes to t's numerator. Where it is uncertain the far margin is wide enough for both, and nothing is
         // said to lie before t_min.
         let size_of_det = det.abs();
-        let signed = t * splat(simd, 1.0).copysign(det);
+        let signed = t * V::splat(simd, 1.0).copysign(det);
         let depth = of_det.mul_add(t_min.abs().max(last.abs()), of_t);
         let beyond = (signed - size_of_det * last).simd_gt(depth);
         let near = of_det.mul_add(t_min.abs(), of_t);
         let before = (signed - size_of_det * t_min).simd_lt(-near) & size_of_det.simd_gt(of_det);
-        let maybe = !(self.outside | (beyond | before).to_bitmask() as u32) & 0xff;
+        let maybe = self.maybe & !((beyond | before).to_bitmask() as u32);
         if maybe == 0 {
             return None;
         }
         // And the two roundings of each end.
-        let depth = signed.abs().mul_add(splat(simd, 4.0 * E), depth);
+        let depth = signed.abs().mul_add(V::splat(simd, 4.0 * E), depth);
         let (low, high) = ((signed - depth) / size_of_det, (signed + depth) / size_of_det);
         Some(Verdict { maybe, through: self.through, low, high })
     }
 }
 
 /// What is known of pairs of a line and a triangle, not all of which are certain misses.
-pub(super) struct Verdict<S: Simd> {
+pub(super) struct Verdict<V, M> {
     /// The lanes that are not certain to miss.
     pub(super) maybe: u32,
     /// The lanes whose lines pass through the insides of their triangles, for certain.
-    pub(super) through: mask32x8<S>,
+    pub(super) through: M,
     /// t lies between these where the line certainly passes through; they mean nothing where it may not.
-    pub(super) low: f32x8<S>,
-    pub(super) high: f32x8<S>,
+    pub(super) low: V,
+    pub(super) high: V,
 }
 
-impl<S: Simd> Verdict<S> {
+/// Of a line and eight triangles.
+pub(super) type OfEight<S> = Verdict<f32x8<S>, mask32x8<S>>;
+
+impl<S: Simd> OfEight<S> {
     /// The same, lane by lane.
     #[inline(always)]
     pub(super) fn outcome(&self) -> Outcome {
@@ -397,7 +411,7 @@ pub(super) fn minus<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
 }
 
 #[inline(always)]
-pub(super) fn dot<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> f32x8<S> {
+pub(super) fn dot<S: Simd, V: SimdFloat<S, Element = f32>>(a: [V; 3], b: [V; 3]) -> V {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 

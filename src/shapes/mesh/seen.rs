@@ -3,9 +3,9 @@
 //! Edge functions, denominator and numerator of t are linear in the direction, with coefficients that are the same for all rays:
 //! U = (e₂ × C)·d, V = (C × e₁)·d, det = (e₁ × e₂)·d. The bounds on their errors are those of the filter: docs/numerics.md §10.
 
-use super::leaf::{Margins, Sides, Triangles, Vec8, Verdict, cross, dot, minus, splat, three};
-use crate::bvh::{Bundle, E, Eight};
-use fearless_simd::{Simd, f32x8, prelude::*};
+use super::leaf::{Margins, OfEight, Sides, Triangles, Vec8, Verdict, cross, dot, minus, splat, three};
+use crate::bvh::{Bundle, E, Sixteen};
+use fearless_simd::{Simd, f32x8, f32x16, mask32x16, prelude::*};
 
 /// Whence, and whither.
 #[derive(Clone, Copy, Debug)]
@@ -72,47 +72,38 @@ impl<S: Simd> Seen<S> {
         !(missed.to_bitmask() as u32) & 0xff
     }
 
-    /// The triangle of a lane against eight rays; `None` if all are certain misses.
+    /// The triangle of a lane against those of sixteen rays that have a bit in `asked`; `None` if all are certain misses.
     #[inline(always)]
-    pub(super) fn triangle(&self, simd: S, lane: usize, rays: &Eight) -> Option<Verdict<S>> {
+    pub(super) fn triangle(&self, simd: S, lane: usize, rays: &Sixteen, asked: u32) -> Option<OfSixteen<S>> {
         let d =
             [rays.direction[0].simd_into(simd), rays.direction[1].simd_into(simd), rays.direction[2].simd_into(simd)];
         let [u, v, det] = [&self.u, &self.v, &self.det];
-        let [u, v, det] = [of(simd, u, lane), of(simd, v, lane), of(simd, det, lane)];
-        let (of_t, of_det) = self.of_depth;
-        judge(
+        let [u, v, det] = [dot(of(simd, u, lane), d), dot(of(simd, v, lane), d), dot(of(simd, det, lane), d)];
+        let everywhere = |x: &f32x8<S>| f32x16::splat(simd, x[lane & 7]);
+        Sides::new([u, v], det, everywhere(&self.edges), asked)?.verdict(
             simd,
-            [dot(u, d), dot(v, d), dot(det, d), splat(simd, self.t[lane & 7])],
-            splat(simd, self.edges[lane & 7]),
-            (splat(simd, of_t[lane & 7]), splat(simd, of_det[lane & 7])),
+            [everywhere(&self.t), det],
+            (everywhere(&self.of_depth.0), everywhere(&self.of_depth.1)),
             [rays.t_min.simd_into(simd), rays.t_max.simd_into(simd)],
         )
     }
 
-    /// All triangles against one of eight rays.
+    /// All triangles against one of sixteen rays.
     #[inline(always)]
-    pub(super) fn ray(&self, simd: S, rays: &Eight, at: usize) -> Option<Verdict<S>> {
+    pub(super) fn ray(&self, simd: S, rays: &Sixteen, at: usize) -> Option<OfEight<S>> {
         let d = everywhere(simd, &rays.direction, at);
-        judge(
+        let det = dot(self.det, d);
+        Sides::new([dot(self.u, d), dot(self.v, d)], det, self.edges, 0xff)?.verdict(
             simd,
-            [dot(self.u, d), dot(self.v, d), dot(self.det, d), self.t],
-            self.edges,
+            [self.t, det],
             self.of_depth,
-            [splat(simd, rays.t_min[at & 7]), splat(simd, rays.t_max[at & 7])],
+            [splat(simd, rays.t_min[at & 15]), splat(simd, rays.t_max[at & 15])],
         )
     }
 }
 
-#[inline(always)]
-fn judge<S: Simd>(
-    simd: S,
-    [u, v, det, t]: [f32x8<S>; 4],
-    edges: f32x8<S>,
-    of_depth: (f32x8<S>, f32x8<S>),
-    stretch: [f32x8<S>; 2],
-) -> Option<Verdict<S>> {
-    Sides::new([u, v], det, edges)?.verdict(simd, [t, det], of_depth, stretch)
-}
+/// Of sixteen lines and a triangle.
+pub(super) type OfSixteen<S> = Verdict<f32x16<S>, mask32x16<S>>;
 
 /// The least and the greatest of a·d for d within `half` of `middle`, but for roundings.
 #[inline(always)]
@@ -123,12 +114,13 @@ fn ends<S: Simd>(a: Vec8<S>, middle: Vec8<S>, half: Vec8<S>) -> [f32x8<S>; 2] {
 
 /// One lane of a vector's components, in every lane.
 #[inline(always)]
-fn of<S: Simd>(simd: S, v: &Vec8<S>, lane: usize) -> Vec8<S> {
-    three(simd, [v[0][lane & 7], v[1][lane & 7], v[2][lane & 7]])
+fn of<S: Simd>(simd: S, v: &Vec8<S>, lane: usize) -> [f32x16<S>; 3] {
+    let everywhere = |x: f32| f32x16::splat(simd, x);
+    [everywhere(v[0][lane & 7]), everywhere(v[1][lane & 7]), everywhere(v[2][lane & 7])]
 }
 
 /// One lane of each row, in every lane.
 #[inline(always)]
-pub(super) fn everywhere<S: Simd>(simd: S, rows: &[[f32; 8]; 3], lane: usize) -> Vec8<S> {
-    three(simd, [rows[0][lane & 7], rows[1][lane & 7], rows[2][lane & 7]])
+pub(super) fn everywhere<S: Simd>(simd: S, rows: &[[f32; 16]; 3], lane: usize) -> Vec8<S> {
+    three(simd, [rows[0][lane & 15], rows[1][lane & 15], rows[2][lane & 15]])
 }
