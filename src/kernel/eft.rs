@@ -5,7 +5,7 @@
 
 use super::cpu::{FusedLanes, fused_lanes};
 use super::lanes::{Lanes, Plain};
-use fearless_simd::{Simd, f64x4};
+use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 use std::fmt::Debug;
 use std::ops::{Add, Sub};
@@ -50,9 +50,9 @@ pub trait Product: Copy + Debug {
     /// n − q·d, rounded once, for a quotient q so near n/d that n − fl(q·d) is exact.
     fn remainder(n: f64, q: f64, d: f64) -> f64;
     /// [`Product::two_product`] in each lane.
-    fn two_products<S: Simd>(a: f64x4<S>, b: f64x4<S>) -> (f64x4<S>, f64x4<S>);
+    fn two_products<S: Simd, V: SimdFloat<S, Element = f64>>(a: V, b: V) -> (V, V);
     /// [`Product::remainder`] in each lane.
-    fn remainders<S: Simd>(n: f64x4<S>, q: f64x4<S>, d: f64x4<S>) -> f64x4<S>;
+    fn remainders<S: Simd, V: SimdFloat<S, Element = f64>>(n: V, q: V, d: V) -> V;
     /// What [`Lanes`] need to know of the CPU: it is asked whether it has the instructions.
     fn cpu() -> <Self::Lanes as Lanes>::Cpu;
 }
@@ -86,14 +86,14 @@ impl Product for Fused {
     }
 
     #[inline(always)]
-    fn two_products<S: Simd>(a: f64x4<S>, b: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+    fn two_products<S: Simd, V: SimdFloat<S, Element = f64>>(a: V, b: V) -> (V, V) {
         let p = a * b;
-        (p, a.simd.mul_sub_precise_f64x4(a, b, p))
+        (p, a.mul_sub_precise(b, p))
     }
 
     #[inline(always)]
-    fn remainders<S: Simd>(n: f64x4<S>, q: f64x4<S>, d: f64x4<S>) -> f64x4<S> {
-        n.simd.mul_add_precise_f64x4(-q, d, n)
+    fn remainders<S: Simd, V: SimdFloat<S, Element = f64>>(n: V, q: V, d: V) -> V {
+        (-q).mul_add_precise(d, n)
     }
 }
 
@@ -118,14 +118,14 @@ impl Product for Split {
     }
 
     #[inline(always)]
-    fn two_products<S: Simd>(a: f64x4<S>, b: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+    fn two_products<S: Simd, V: SimdFloat<S, Element = f64>>(a: V, b: V) -> (V, V) {
         let p = a * b;
         let ((a_hi, a_lo), (b_hi, b_lo)) = (splits(a), splits(b));
         (p, ((a_hi * b_hi - p) + a_hi * b_lo + a_lo * b_hi) + a_lo * b_lo)
     }
 
     #[inline(always)]
-    fn remainders<S: Simd>(n: f64x4<S>, q: f64x4<S>, d: f64x4<S>) -> f64x4<S> {
+    fn remainders<S: Simd, V: SimdFloat<S, Element = f64>>(n: V, q: V, d: V) -> V {
         let (t, t_lo) = Self::two_products(q, d);
         (n - t) - t_lo
     }
@@ -144,8 +144,8 @@ fn split(a: f64) -> (f64, f64) {
 
 /// [`split`] in each lane.
 #[inline(always)]
-fn splits<S: Simd>(a: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
-    let c = a * a.simd.splat_f64x4(VELTKAMP);
+fn splits<S: Simd, V: SimdFloat<S, Element = f64>>(a: V) -> (V, V) {
+    let c = a * VELTKAMP;
     let hi = c - (c - a);
     (hi, a - hi)
 }

@@ -20,7 +20,7 @@ use fearless_simd::Simd;
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
 
-pub mod four;
+pub mod eight;
 
 /// Where `ray` meets the closed triangle of the three `vertices`, if λ lies inside `within`.
 ///

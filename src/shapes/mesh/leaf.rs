@@ -6,8 +6,7 @@
 
 use super::Mesh;
 use crate::bvh::{Bundle, E, LocalRay};
-use crate::kernel::triangle::four;
-use fearless_simd::{Simd, f32x4, f32x8, f64x4, mask32x8, prelude::*};
+use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
 use glam::DVec3;
 
 /// Triangles have 29 bits for their number.
@@ -75,6 +74,11 @@ impl Spot {
     }
 
     #[inline(always)]
+    pub(super) fn at(self, mesh: &Mesh) -> (&Leaf, usize) {
+        (&mesh.leaves[self.leaf as usize], self.lane as usize & 7)
+    }
+
+    #[inline(always)]
     pub(super) fn number(self, mesh: &Mesh) -> u32 {
         mesh.leaves[self.leaf as usize].number(self.lane as usize & 7)
     }
@@ -83,46 +87,6 @@ impl Spot {
     pub(super) fn vertices(self, mesh: &Mesh) -> [DVec3; 3] {
         mesh.leaves[self.leaf as usize].vertices(self.lane as usize & 7, mesh)
     }
-}
-
-/// The vertices of four triangles, each in a register of its own.
-#[inline(always)]
-pub(super) fn vertices_of_four<S: Simd>(simd: S, mesh: &Mesh, spots: [Spot; 4]) -> [four::Vectors<S>; 3] {
-    let [a, b, c, d] = spots;
-    if !mesh.exact {
-        let (a, b, c, d) = (a.vertices(mesh), b.vertices(mesh), c.vertices(mesh), d.vertices(mesh));
-        let vertex = |i: usize| four::vectors(simd, [a[i], b[i], c[i], d[i]]);
-        return [vertex(0), vertex(1), vertex(2)];
-    }
-    let leaf = |spot: Spot| (&mesh.leaves[spot.leaf as usize], spot.lane as usize & 7);
-    let (a, b, c, d) = (leaf(a), leaf(b), leaf(c), leaf(d));
-    let frame = mesh.frame();
-    let unscale = f64x4::splat(simd, frame.unscale);
-    let turn = |(leaf, lane): (&Leaf, usize)| (leaf.id[lane] >> ROTATION) as f32;
-    let turns = widened(simd, [turn(a), turn(b), turn(c), turn(d)]);
-    let (once, twice) = (turns.simd_eq(f64x4::splat(simd, 1.0)), turns.simd_eq(f64x4::splat(simd, 2.0)));
-    let mut axes = [[unscale; 3]; 3];
-    for (axis, turned) in axes.iter_mut().enumerate() {
-        let center = f64x4::splat(simd, frame.center[axis]);
-        let mut v = [unscale; 3];
-        for (i, v) in v.iter_mut().enumerate() {
-            let rows = [&a.0.vertices[i][axis], &b.0.vertices[i][axis], &c.0.vertices[i][axis], &d.0.vertices[i][axis]];
-            *v = widened(simd, [rows[0][a.1], rows[1][b.1], rows[2][c.1], rows[3][d.1]]) * unscale + center;
-        }
-        *turned = [
-            once.select(v[2], twice.select(v[1], v[0])),
-            once.select(v[0], twice.select(v[2], v[1])),
-            once.select(v[1], twice.select(v[0], v[2])),
-        ];
-    }
-    let [x, y, z] = axes;
-    [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]]
-}
-
-#[inline(always)]
-fn widened<S: Simd>(simd: S, x: [f32; 4]) -> f64x4<S> {
-    let x = f32x4::simd_from(simd, x);
-    x.combine(x).widen().0
 }
 
 /// The ray as the filter wants it: in f32, with the margins' constants.

@@ -1,13 +1,13 @@
-//! λ of many rays, each of which is known to meet a triangle: four at a time.
+//! λ of many rays, each of which is known to meet a triangle: eight at a time.
 
 use super::Mesh;
 use super::each::Stretch;
-use super::leaf::{Spot, UNCERTIFIED, vertices_of_four};
+use super::leaf::{ROTATION, Spot, UNCERTIFIED};
 use super::query::exactly;
-use crate::Hit;
-use crate::kernel::triangle::four;
-use fearless_simd::{Simd, f64x4, prelude::*};
-use glam::DVec2;
+use crate::kernel::triangle::eight;
+use crate::{Hit, Interval, Ray};
+use fearless_simd::{Simd, f32x8, f64x4, f64x8, prelude::*};
+use glam::{DVec2, DVec3};
 
 /// Answers those `rays` that have a bit in `which` with what they hit at their `spots`, to the bit as [`exactly`] has it.
 #[inline(always)]
@@ -20,61 +20,153 @@ pub(super) fn settle<S: Simd>(
     hits: &mut [Option<Hit>],
 ) {
     while which != 0 {
-        let mut of = [0; 4];
-        let count = which.count_ones().min(4) as usize;
-        for ray in &mut of[..count] {
-            *ray = which.trailing_zeros() as usize;
-            which &= which - 1;
-        }
+        let count = which.count_ones();
         if count < FEWEST || UNCERTIFIED {
-            for &ray in &of[..count] {
-                let (ref asked, within) = rays[ray];
-                hits[ray] = exactly(simd, mesh, asked, within, Spot::of(spots[ray]));
-            }
-        } else {
-            for ray in count..4 {
-                of[ray] = of[0];
-            }
-            settle_four(simd, mesh, rays, of, spots, hits);
+            let ray = which.trailing_zeros() as usize;
+            which &= which - 1;
+            let (ref asked, within) = rays[ray];
+            hits[ray] = exactly(simd, mesh, asked, within, Spot::of(spots[ray]));
+            continue;
         }
+        let mut of = [0; 8];
+        for ray in &mut of {
+            // The last stands for those that are not there.
+            *ray = which.trailing_zeros() as usize;
+            let others = which & (which - 1);
+            which = if others == 0 { which } else { others };
+        }
+        which = if count > 8 { which } else { 0 };
+        settle_eight(simd, mesh, rays, of, spots, hits);
     }
 }
 
 /// Fewer are answered one by one.
-const FEWEST: usize = 2;
+const FEWEST: u32 = 2;
+
+/// Of eight rows of eight the columns.
+#[inline(always)]
+fn columns<S: Simd>(rows: [f64x8<S>; 8]) -> [f64x8<S>; 8] {
+    let [a, b, c, d, e, f, g, h] = rows;
+    // Every other number of two rows, then every fourth of four, then every eighth.
+    let ((a, e), (b, f), (c, g), (d, h)) = (a.deinterleave(b), c.deinterleave(d), e.deinterleave(f), g.deinterleave(h));
+    let ((a, c), (b, d), (e, g), (f, h)) = (a.deinterleave(b), c.deinterleave(d), e.deinterleave(f), g.deinterleave(h));
+    let ((x0, x4), (x2, x6)) = (a.deinterleave(b), c.deinterleave(d));
+    let ((x1, x5), (x3, x7)) = (e.deinterleave(f), g.deinterleave(h));
+    [x0, x1, x2, x3, x4, x5, x6, x7]
+}
+
+/// x, y and z of eight vectors.
+#[inline(always)]
+fn vectors<S: Simd>(simd: S, v: &[DVec3; 8]) -> eight::Vectors<S> {
+    let [a, b, c, d, e, f, g, h] = v;
+    let (ab, cd, ef, gh) = (two(simd, a, b), two(simd, c, d), two(simd, e, f), two(simd, g, h));
+    let ((a, b), (c, d)) = (ab.deinterleave(cd), ef.deinterleave(gh));
+    let ((x, z), (y, _)) = (a.deinterleave(c), b.deinterleave(d));
+    [x, y, z]
+}
 
 #[inline(always)]
-fn settle_four<S: Simd>(
+fn two<S: Simd>(simd: S, a: &DVec3, b: &DVec3) -> f64x8<S> {
+    f64x4::simd_from(simd, [a.x, a.y, a.z, 0.0]).combine(f64x4::simd_from(simd, [b.x, b.y, b.z, 0.0]))
+}
+
+/// The vertices of eight triangles, each in a register of its own.
+#[inline(always)]
+fn vertices<S: Simd>(simd: S, mesh: &Mesh, spots: &[Spot; 8]) -> [eight::Vectors<S>; 3] {
+    if !mesh.exact {
+        let mut vertices = [[DVec3::ZERO; 8]; 3];
+        for (i, spot) in spots.iter().enumerate() {
+            let [a, b, c] = spot.vertices(mesh);
+            (vertices[0][i], vertices[1][i], vertices[2][i]) = (a, b, c);
+        }
+        let [a, b, c] = &vertices;
+        return [vectors(simd, a), vectors(simd, b), vectors(simd, c)];
+    }
+    let [a, b, c, d, e, f, g, h] = spots;
+    let leaves = [a.at(mesh), b.at(mesh), c.at(mesh), d.at(mesh), e.at(mesh), f.at(mesh), g.at(mesh), h.at(mesh)];
+    let frame = mesh.frame();
+    let unscale = f64x8::splat(simd, frame.unscale);
+    let mut turns = [0.0; 8];
+    for (turn, (leaf, lane)) in turns.iter_mut().zip(&leaves) {
+        *turn = (leaf.id[*lane] >> ROTATION) as f32;
+    }
+    let turns = widened(simd, turns);
+    let (once, twice) = (turns.simd_eq(f64x8::splat(simd, 1.0)), turns.simd_eq(f64x8::splat(simd, 2.0)));
+    let mut axes = [[unscale; 3]; 3];
+    for (axis, turned) in axes.iter_mut().enumerate() {
+        let center = f64x8::splat(simd, frame.center[axis]);
+        let mut v = [unscale; 3];
+        for (i, v) in v.iter_mut().enumerate() {
+            let mut x = [0.0; 8];
+            for (x, (leaf, lane)) in x.iter_mut().zip(&leaves) {
+                *x = leaf.vertices[i][axis][*lane];
+            }
+            *v = widened(simd, x) * unscale + center;
+        }
+        *turned = [
+            once.select(v[2], twice.select(v[1], v[0])),
+            once.select(v[0], twice.select(v[2], v[1])),
+            once.select(v[1], twice.select(v[0], v[2])),
+        ];
+    }
+    let [x, y, z] = axes;
+    [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]]
+}
+
+#[inline(always)]
+fn widened<S: Simd>(simd: S, x: [f32; 8]) -> f64x8<S> {
+    let x = f32x8::simd_from(simd, x);
+    x.combine(x).widen().0
+}
+
+/// All that a ray is.
+#[inline(always)]
+fn row<S: Simd>(simd: S, (Ray { origin: o, direction: d }, Interval { min, max }): &Stretch) -> f64x8<S> {
+    f64x8::simd_from(simd, [o.x, o.y, o.z, d.x, d.y, d.z, *min, *max])
+}
+
+#[inline(always)]
+fn settle_eight<S: Simd>(
     simd: S,
     mesh: &Mesh,
     rays: &[Stretch],
-    of: [usize; 4],
+    of: [usize; 8],
     spots: &[u32],
     hits: &mut [Option<Hit>],
 ) {
-    let spot = |i: usize| Spot::of(spots[of[i]]);
-    let (p, q, r, s) = (&rays[of[0]], &rays[of[1]], &rays[of[2]], &rays[of[3]]);
-    let four::Four { lambda, error, uv: [u, v], hit, unsure } = four::intersect(
+    let mut rows = [f64x8::splat(simd, 0.0); 8];
+    for (row, &ray) in rows.iter_mut().zip(&of) {
+        *row = self::row(simd, &rays[ray]);
+    }
+    let [ox, oy, oz, dx, dy, dz, min, max] = columns(rows);
+    let mut spot = [Spot::of(0); 8];
+    for (spot, &ray) in spot.iter_mut().zip(&of) {
+        *spot = Spot::of(spots[ray]);
+    }
+    let vertices = vertices(simd, mesh, &spot);
+    let eight::Eight { lambda, error, uv: [u, v], hit, unsure } = eight::intersect(
         simd,
-        &four::Rays {
-            origin: four::vectors(simd, [p.0.origin, q.0.origin, r.0.origin, s.0.origin]),
-            direction: four::vectors(simd, [p.0.direction, q.0.direction, r.0.direction, s.0.direction]),
-            vertices: vertices_of_four(simd, mesh, [spot(0), spot(1), spot(2), spot(3)]),
-            within: [
-                f64x4::simd_from(simd, [p.1.min, q.1.min, r.1.min, s.1.min]),
-                f64x4::simd_from(simd, [p.1.max, q.1.max, r.1.max, s.1.max]),
-            ],
+        &eight::Rays {
+            origin: [ox, oy, oz],
+            direction: [dx, dy, dz],
+            vertices,
+            within: [min, max],
         },
     );
-    let [lambda, error, u, v]: [[f64; 4]; 4] = [lambda.into(), error.into(), u.into(), v.into()];
+    let [lambda, error, u, v]: [[f64; 8]; 4] = [lambda.into(), error.into(), u.into(), v.into()];
+    let found = |i: usize| Some(Hit { lambda: lambda[i], error: error[i], uv: DVec2::new(u[i], v[i]), part: spot[i].number(mesh) });
+    if hit == 0xff {
+        for i in 0..8 {
+            hits[of[i]] = found(i);
+        }
+        return;
+    }
     for (i, &ray) in of.iter().enumerate() {
-        let spot = spot(i);
         if hit >> i & 1 == 1 {
-            let uv = DVec2::new(u[i], v[i]);
-            hits[ray] = Some(Hit { lambda: lambda[i], error: error[i], uv, part: spot.number(mesh) });
+            hits[ray] = found(i);
         } else if unsure >> i & 1 == 1 {
             let (ref asked, within) = rays[ray];
-            hits[ray] = exactly(simd, mesh, asked, within, spot);
+            hits[ray] = exactly(simd, mesh, asked, within, Spot::of(spots[ray]));
         }
     }
 }

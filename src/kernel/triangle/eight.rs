@@ -1,4 +1,4 @@
-//! The fast path for four rays at once, each with a triangle of its own: a register holds the same number of all four.
+//! The fast path for eight rays at once, each with a triangle of its own: a register holds the same number of all.
 //!
 //! The operations are those of [`intersect_with`](super::intersect_with), each rounded alike, in the same order: what is
 //! answered here has the same bits.
@@ -7,24 +7,11 @@ use super::{LARGEST, PRESENT, VANISHED, WEIGHT};
 use crate::kernel::bound::{TRIANGLE_CONDITION, TRIANGLE_LAMBDA, TRIANGLE_SIDES, U};
 use crate::kernel::cpu;
 use crate::kernel::eft::{Fused, Product, Split, two_diff, two_sum};
-use fearless_simd::{Simd, f64x4, mask64x4, prelude::*};
-use glam::DVec3;
+use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
+/// Of eight vectors the x, the y and the z.
+pub type Vectors<S> = [f64x8<S>; 3];
 
-/// Of four vectors the x, the y and the z.
-pub type Vectors<S> = [f64x4<S>; 3];
-
-/// Gathers four vectors.
-#[inline(always)]
-#[must_use]
-pub fn vectors<S: Simd>(simd: S, [a, b, c, d]: [DVec3; 4]) -> Vectors<S> {
-    [
-        f64x4::simd_from(simd, [a.x, b.x, c.x, d.x]),
-        f64x4::simd_from(simd, [a.y, b.y, c.y, d.y]),
-        f64x4::simd_from(simd, [a.z, b.z, c.z, d.z]),
-    ]
-}
-
-/// Four rays, each with a triangle and an interval.
+/// Eight rays, each with a triangle and an interval.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays<S: Simd> {
     /// Where they begin.
@@ -34,36 +21,36 @@ pub struct Rays<S: Simd> {
     /// The first, second and third vertex of each one's triangle.
     pub vertices: [Vectors<S>; 3],
     /// Between which λ counts, the ends excluded.
-    pub within: [f64x4<S>; 2],
+    pub within: [f64x8<S>; 2],
 }
 
 /// What [`intersect`] found; a bit of the masks is a ray, the lowest the first.
 #[derive(Clone, Copy, Debug)]
-pub struct Four<S: Simd> {
+pub struct Eight<S: Simd> {
     /// λ of those that hit.
-    pub lambda: f64x4<S>,
+    pub lambda: f64x8<S>,
     /// How far off λ may be.
-    pub error: f64x4<S>,
+    pub error: f64x8<S>,
     /// The weights of the second and of the third vertex.
-    pub uv: [f64x4<S>; 2],
+    pub uv: [f64x8<S>; 2],
     /// Which rays certainly hit.
     pub hit: u32,
     /// Which rays [`super::intersect`] has to answer: neither do they certainly hit nor certainly miss.
     pub unsure: u32,
 }
 
-/// Where four rays meet a triangle each, to the bit as [`super::intersect`] has it, as far as the fast path is certain.
+/// Where eight rays meet a triangle each, to the bit as [`super::intersect`] has it, as far as the fast path is certain.
 ///
 /// For code that was dispatched to the instructions of `simd`.
 #[inline(always)]
 #[must_use]
-pub fn intersect<S: Simd>(simd: S, rays: &Rays<S>) -> Four<S> {
+pub fn intersect<S: Simd>(simd: S, rays: &Rays<S>) -> Eight<S> {
     if cpu::has_fused(simd) { fast::<S, Fused>(simd, rays) } else { fast::<S, Split>(simd, rays) }
 }
 
 #[inline(always)]
-fn fast<S: Simd, P: Product>(simd: S, rays: &Rays<S>) -> Four<S> {
-    let splat = |x: f64| f64x4::splat(simd, x);
+fn fast<S: Simd, P: Product>(simd: S, rays: &Rays<S>) -> Eight<S> {
+    let splat = |x: f64| f64x8::splat(simd, x);
     let Rays { origin: o, direction: d, vertices: [a, b, c], within: [min, max] } = rays;
     let (e1, e2, s) = (Double::difference(b, a), Double::difference(c, a), Double::difference(o, a));
     let (n, q) = (e1.cross::<P>(&e2), cross(d, &s.hi));
@@ -87,25 +74,25 @@ fn fast<S: Simd, P: Product>(simd: S, rays: &Rays<S>) -> Four<S> {
 
     let first = -height * inverse;
     let error = splat(U + TRIANGLE_LAMBDA) * first.abs();
-    let remainder = P::remainders(height, -first, det) + (height_lo + first * det_lo);
+    let remainder = P::remainders::<S, _>(height, -first, det) + (height_lo + first * det_lo);
     let lambda = first - remainder * inverse;
     let (from, to) = (lambda - error, lambda + error);
     let hit = certain & from.simd_gt(*min) & to.simd_lt(*max);
     let miss = miss | certain & (to.simd_lt(*min) | from.simd_gt(*max));
     let uv = [(su * inverse).min(splat(1.0)), (sv * inverse).min(splat(1.0))];
-    Four { lambda, error, uv, hit: hit.to_bitmask() as u32, unsure: (!(hit | miss)).to_bitmask() as u32 }
+    Eight { lambda, error, uv, hit: hit.to_bitmask() as u32, unsure: (!(hit | miss)).to_bitmask() as u32 }
 }
 
 /// Whether a triple product, of sizes with this product, has lost few enough bits: known before λ is.
 #[inline(always)]
-fn is_known<S: Simd>(product: f64x4<S>, size: f64x4<S>) -> mask64x4<S> {
-    let splat = |x: f64| f64x4::splat(size.simd, x);
+fn is_known<S: Simd>(product: f64x8<S>, size: f64x8<S>) -> mask64x8<S> {
+    let splat = |x: f64| f64x8::splat(size.simd, x);
     let amplified = product.abs() * splat(TRIANGLE_CONDITION);
     (size + splat(TRIANGLE_CONDITION * PRESENT)).simd_lt(amplified)
         & amplified.simd_lt(splat(TRIANGLE_CONDITION / PRESENT))
 }
 
-/// Four vectors as unevaluated sums; as in [`lanes`](crate::kernel::lanes), where a register holds one vector.
+/// Eight vectors as unevaluated sums; as in [`lanes`](crate::kernel::lanes), where a register holds one vector.
 struct Double<S: Simd> {
     hi: Vectors<S>,
     lo: Vectors<S>,
@@ -114,7 +101,7 @@ struct Double<S: Simd> {
 impl<S: Simd> Double<S> {
     /// By component. Written out, since `array::map` is not always inlined, and then every intrinsic is a call.
     #[inline(always)]
-    fn each(component: impl Fn(usize) -> (f64x4<S>, f64x4<S>)) -> Self {
+    fn each(component: impl Fn(usize) -> (f64x8<S>, f64x8<S>)) -> Self {
         let ((x, x_lo), (y, y_lo), (z, z_lo)) = (component(0), component(1), component(2));
         Self { hi: [x, y, z], lo: [x_lo, y_lo, z_lo] }
     }
@@ -134,7 +121,7 @@ impl<S: Simd> Double<S> {
             |i| {
                 let (j, k) = ((i + 1) % 3, (i + 2) % 3);
                 let ((p, p_lo), (m, m_lo)) =
-                    (P::two_products(self.hi[j], other.hi[k]), P::two_products(self.hi[k], other.hi[j]));
+                    (P::two_products::<S, _>(self.hi[j], other.hi[k]), P::two_products::<S, _>(self.hi[k], other.hi[j]));
                 let (hi, rounding) = two_diff(p, m);
                 let forth = self.hi[j] * other.lo[k] + self.lo[j] * other.hi[k];
                 let back = self.hi[k] * other.lo[j] + self.lo[k] * other.hi[j];
@@ -148,7 +135,7 @@ impl<S: Simd> Double<S> {
         Self::each(
             #[inline(always)]
             |i| {
-                let (hi, lo) = P::two_products(self.hi[i], other.hi[i]);
+                let (hi, lo) = P::two_products::<S, _>(self.hi[i], other.hi[i]);
                 (hi, lo + (self.lo[i] * other.hi[i] + self.hi[i] * other.lo[i]))
             },
         )
@@ -159,7 +146,7 @@ impl<S: Simd> Double<S> {
         Self::each(
             #[inline(always)]
             |i| {
-                let (hi, lo) = P::two_products(self.hi[i], other[i]);
+                let (hi, lo) = P::two_products::<S, _>(self.hi[i], other[i]);
                 (hi, lo + self.lo[i] * other[i])
             },
         )
@@ -167,7 +154,7 @@ impl<S: Simd> Double<S> {
 
     /// x + y + z.
     #[inline(always)]
-    fn sum(&self) -> (f64x4<S>, f64x4<S>) {
+    fn sum(&self) -> (f64x8<S>, f64x8<S>) {
         let ([x, y, z], [x_lo, y_lo, z_lo]) = (self.hi, self.lo);
         let (xy, rounding) = two_sum(x, y);
         let (sum, more_rounding) = two_sum(xy, z);
@@ -181,13 +168,13 @@ fn cross<S: Simd>(a: &Vectors<S>, b: &Vectors<S>) -> Vectors<S> {
 }
 
 #[inline(always)]
-fn dot<S: Simd>(a: &Vectors<S>, b: &Vectors<S>) -> f64x4<S> {
+fn dot<S: Simd>(a: &Vectors<S>, b: &Vectors<S>) -> f64x8<S> {
     (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
 }
 
 /// The largest |component|.
 #[inline(always)]
-fn largest<S: Simd>(v: &Vectors<S>) -> f64x4<S> {
+fn largest<S: Simd>(v: &Vectors<S>) -> f64x8<S> {
     v[0].abs().max(v[1].abs()).max(v[2].abs())
 }
 
@@ -200,12 +187,13 @@ mod tests {
     use crate::kernel::tally::Tally;
     use crate::{Interval, Ray};
     use fearless_simd::dispatch;
+    use glam::DVec3;
 
     type Case = (Ray, [DVec3; 3], Interval);
 
     #[inline(always)]
     fn gathered<S: Simd>(simd: S, cases: &[Case]) -> Rays<S> {
-        let number = |f: &dyn Fn(&Case) -> f64| -> f64x4<S> { [0, 1, 2, 3].map(|i| f(&cases[i])).simd_into(simd) };
+        let number = |f: &dyn Fn(&Case) -> f64| -> f64x8<S> { [0, 1, 2, 3, 4, 5, 6, 7].map(|i| f(&cases[i])).simd_into(simd) };
         let vectors = |f: &dyn Fn(&Case) -> DVec3| [0, 1, 2].map(|axis| number(&|case| f(case)[axis]));
         Rays {
             origin: vectors(&|(ray, ..)| ray.origin),
@@ -216,7 +204,7 @@ mod tests {
     }
 
     /// Hits, and rays left to the scalar function.
-    fn compare(cases: &[Case; 4]) -> [u32; 2] {
+    fn compare(cases: &[Case; 8]) -> [u32; 2] {
         let alone = cases.map(|(ray, t, within)| {
             let before = Tally::now();
             let hit = super::super::intersect(&ray, &t, within);
@@ -224,18 +212,18 @@ mod tests {
         });
         for (level, detected) in Level::all() {
             dispatch!(detected.token(), simd => {
-                let four = intersect(simd, &gathered(simd, cases));
+                let eight = intersect(simd, &gathered(simd, cases));
                 for (i, (hit, unsure)) in alone.into_iter().enumerate() {
-                    let of = |x: f64x4<_>| x[i].to_bits();
-                    assert_eq!(four.unsure >> i & 1 == 1, unsure, "{level}: {:?}", cases[i]);
-                    assert_eq!(four.hit >> i & 1 == 1, hit.is_some() && !unsure, "{level}: {:?}", cases[i]);
+                    let of = |x: f64x8<_>| x[i].to_bits();
+                    assert_eq!(eight.unsure >> i & 1 == 1, unsure, "{level}: {:?}", cases[i]);
+                    assert_eq!(eight.hit >> i & 1 == 1, hit.is_some() && !unsure, "{level}: {:?}", cases[i]);
                     if let (Some(hit), false) = (hit, unsure) {
-                        let same = [of(four.lambda), of(four.error), of(four.uv[0]), of(four.uv[1])];
+                        let same = [of(eight.lambda), of(eight.error), of(eight.uv[0]), of(eight.uv[1])];
                         let alone = [hit.lambda, hit.error, hit.uv.x, hit.uv.y].map(f64::to_bits);
                         assert_eq!(same, alone, "{level}: {:?}", cases[i]);
                     }
                 }
-                assert!((four.hit | four.unsure) < 16);
+                assert!((eight.hit | eight.unsure) < 256);
             });
         }
         alone
@@ -245,7 +233,7 @@ mod tests {
 
     /// Ordinary and hard triangles; ties; ends of the interval at λ or an ulp beside it; numbers that leave the range.
     #[test]
-    fn four_answer_as_one_does_to_the_bit() {
+    fn eight_answer_as_one_does_to_the_bit() {
         let (mut cases, mut seen) = (Vec::new(), [0; 3]);
         each(40_000, DIMENSION + 3, |x| {
             let (mut ray, mut t) = setting(x);
@@ -285,15 +273,14 @@ mod tests {
                 _ => Interval::LINE,
             };
             cases.push((ray, t, within));
-            if let [.., a, b, c, d] = cases[..]
-                && cases.len().is_multiple_of(4)
-            {
-                let [hits, unsure] = compare(&[a, b, c, d]);
-                seen = [seen[0] + 4, seen[1] + hits, seen[2] + unsure];
+            if cases.len() == 8 {
+                let [hits, unsure] = compare(cases.as_array().expect("eight"));
+                seen = [seen[0] + 8, seen[1] + hits, seen[2] + unsure];
+                cases.clear();
             }
         });
         let [rays, hits, unsure] = seen;
-        println!("triangle, four at once: {rays} rays, {hits} hits, {unsure} left to the scalar function");
+        println!("triangle, eight at once: {rays} rays, {hits} hits, {unsure} left to the scalar function");
         assert!(hits * 5 > rays && unsure * 10 > rays && unsure * 4 < rays * 3);
     }
 }
