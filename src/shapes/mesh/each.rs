@@ -141,12 +141,15 @@ impl<'a, A> Walk<'a, A> {
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
-            for sixteen in 0..SIXTEENS {
-                let asked = rays >> (16 * sixteen) & 0xffff;
-                let Some(verdict) = seen.triangle(simd, lane as usize, &self.bundle.rays[sixteen], asked) else { continue };
-                let done = A::of_sixteen(self, simd, Spot { leaf: number, lane }, sixteen, &verdict);
-                rays &= !(done << (16 * sixteen));
+            let [a, b] = &self.bundle.rays;
+            let (mut first, mut second) = (seen.triangle(simd, lane as usize, a), seen.triangle(simd, lane as usize, b));
+            (first.maybe, second.maybe) = (first.maybe & rays, second.maybe & rays >> 16);
+            if first.maybe | second.maybe == 0 {
+                continue;
             }
+            let spot = Spot { leaf: number, lane };
+            let done = A::of_sixteen(self, simd, spot, 0, &first.verdict(simd));
+            rays &= !(done | A::of_sixteen(self, simd, spot, 1, &second.verdict(simd)) << 16);
         }
     }
 

@@ -195,21 +195,28 @@ pub(super) fn filter<S: Simd>(
     let r = cross(c, d);
     let n = cross(e1, e2);
     let det = dot(n, d);
-    let sides = Sides::new([dot(r, e2), -dot(r, e1)], det, margins.edges(simd, size), 0xff)?;
-    sides.verdict(simd, [dot(n, c), det], margins.depth(simd, size, c, n), [t_min, last])
+    let sides = Sides::new([dot(r, e2), -dot(r, e1)], det, margins.edges(simd, size));
+    if sides.maybe == 0 {
+        return None;
+    }
+    let depths = sides.depths(simd, [dot(n, c), det], margins.depth(simd, size, c, n), [t_min, last]);
+    if depths.maybe == 0 {
+        return None;
+    }
+    Some(depths.verdict(simd))
 }
 
 /// On which sides of the triangle's edges a line passes, as far as is certain.
 pub(super) struct Sides<M> {
-    maybe: u32,
+    /// The lanes whose lines are not certain to pass outside.
+    pub(super) maybe: u32,
     through: M,
 }
 
 impl<M> Sides<M> {
-    /// From the edge functions and what they may be off by, of the lanes `asked` for; `None` if all those lines are certain to
-    /// pass outside.
+    /// From the edge functions and what they may be off by.
     #[inline(always)]
-    pub(super) fn new<S, V>([u, v]: [V; 2], det: V, margin: V, asked: u32) -> Option<Self>
+    pub(super) fn new<S, V>([u, v]: [V; 2], det: V, margin: V) -> Self
     where
         S: Simd,
         V: SimdFloat<S, Element = f32, Mask = M>,
@@ -219,23 +226,21 @@ impl<M> Sides<M> {
         // Certainly a miss: one edge function above zero, another below. An empty lane has a negative margin.
         let least = u.min(v.min(w));
         let most = u.max(v.max(w));
-        let maybe = asked & !((least.simd_lt(-margin) & most.simd_gt(margin)).to_bitmask() as u32);
-        if maybe == 0 {
-            return None;
-        }
+        let outside = (least.simd_lt(-margin) & most.simd_gt(margin)).to_bitmask() as u32;
         // Certainly through: all three above zero, or all below.
-        Some(Self { maybe, through: least.simd_gt(margin) | most.simd_lt(-margin) })
+        let through = least.simd_gt(margin) | most.simd_lt(-margin);
+        Self { maybe: !outside & ((1 << V::LEN) - 1), through }
     }
 
-    /// What follows with t's numerator and denominator and what they may be off by; `None` if all are certain misses.
+    /// What follows with t's numerator and denominator and what they may be off by.
     #[inline(always)]
-    pub(super) fn verdict<S, V>(
+    pub(super) fn depths<S, V>(
         self,
         simd: S,
         [t, det]: [V; 2],
         (of_t, of_det): (V, V),
         [t_min, last]: [V; 2],
-    ) -> Option<Verdict<V, M>>
+    ) -> Sighting<V, M>
     where
         S: Simd,
         V: SimdFloat<S, Element = f32, Mask = M>,
@@ -250,13 +255,32 @@ impl<M> Sides<M> {
         let near = of_det.mul_add(t_min.abs(), of_t);
         let before = (signed - size_of_det * t_min).simd_lt(-near) & size_of_det.simd_gt(of_det);
         let maybe = self.maybe & !((beyond | before).to_bitmask() as u32);
-        if maybe == 0 {
-            return None;
-        }
+        Sighting { maybe, through: self.through, signed, size_of_det, depth }
+    }
+}
+
+/// All but the divisions of a [`Verdict`].
+pub(super) struct Sighting<V, M> {
+    pub(super) maybe: u32,
+    through: M,
+    signed: V,
+    size_of_det: V,
+    depth: V,
+}
+
+impl<V, M> Sighting<V, M> {
+    /// Where along the lines the triangles are met.
+    #[inline(always)]
+    pub(super) fn verdict<S>(self, simd: S) -> Verdict<V, M>
+    where
+        S: Simd,
+        V: SimdFloat<S, Element = f32, Mask = M>,
+    {
+        let Self { maybe, through, signed, size_of_det, depth } = self;
         // And the two roundings of each end.
         let depth = signed.abs().mul_add(V::splat(simd, 4.0 * E), depth);
         let (low, high) = ((signed - depth) / size_of_det, (signed + depth) / size_of_det);
-        Some(Verdict { maybe, through: self.through, low, high })
+        Verdict { maybe, through, low, high }
     }
 }
 

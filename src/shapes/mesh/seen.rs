@@ -3,7 +3,7 @@
 //! Edge functions, denominator and numerator of t are linear in the direction, with coefficients that are the same for all rays:
 //! U = (e₂ × C)·d, V = (C × e₁)·d, det = (e₁ × e₂)·d. The bounds on their errors are those of the filter: docs/numerics.md §10.
 
-use super::leaf::{Margins, OfEight, Sides, Triangles, Vec8, Verdict, cross, dot, minus, splat, three};
+use super::leaf::{Margins, OfEight, Sides, Sighting, Triangles, Vec8, Verdict, cross, dot, minus, splat, three};
 use crate::bvh::{Bundle, E, Sixteen};
 use fearless_simd::{Simd, f32x8, f32x16, mask32x16, prelude::*};
 
@@ -72,15 +72,15 @@ impl<S: Simd> Seen<S> {
         !(missed.to_bitmask() as u32) & 0xff
     }
 
-    /// The triangle of a lane against those of sixteen rays that have a bit in `asked`; `None` if all are certain misses.
+    /// The triangle of a lane against sixteen rays.
     #[inline(always)]
-    pub(super) fn triangle(&self, simd: S, lane: usize, rays: &Sixteen, asked: u32) -> Option<OfSixteen<S>> {
+    pub(super) fn triangle(&self, simd: S, lane: usize, rays: &Sixteen) -> Sighting<f32x16<S>, mask32x16<S>> {
         let d =
             [rays.direction[0].simd_into(simd), rays.direction[1].simd_into(simd), rays.direction[2].simd_into(simd)];
         let [u, v, det] = [&self.u, &self.v, &self.det];
         let [u, v, det] = [dot(of(simd, u, lane), d), dot(of(simd, v, lane), d), dot(of(simd, det, lane), d)];
         let everywhere = |x: &f32x8<S>| f32x16::splat(simd, x[lane & 7]);
-        Sides::new([u, v], det, everywhere(&self.edges), asked)?.verdict(
+        Sides::new([u, v], det, everywhere(&self.edges)).depths(
             simd,
             [everywhere(&self.t), det],
             (everywhere(&self.of_depth.0), everywhere(&self.of_depth.1)),
@@ -88,17 +88,21 @@ impl<S: Simd> Seen<S> {
         )
     }
 
-    /// All triangles against one of sixteen rays.
+    /// All triangles against one of sixteen rays; `None` if all are certain misses.
     #[inline(always)]
     pub(super) fn ray(&self, simd: S, rays: &Sixteen, at: usize) -> Option<OfEight<S>> {
         let d = everywhere(simd, &rays.direction, at);
         let det = dot(self.det, d);
-        Sides::new([dot(self.u, d), dot(self.v, d)], det, self.edges, 0xff)?.verdict(
-            simd,
-            [self.t, det],
-            self.of_depth,
-            [splat(simd, rays.t_min[at & 15]), splat(simd, rays.t_max[at & 15])],
-        )
+        let sides = Sides::new([dot(self.u, d), dot(self.v, d)], det, self.edges);
+        if sides.maybe == 0 {
+            return None;
+        }
+        let stretch = [splat(simd, rays.t_min[at & 15]), splat(simd, rays.t_max[at & 15])];
+        let depths = sides.depths(simd, [self.t, det], self.of_depth, stretch);
+        if depths.maybe == 0 {
+            return None;
+        }
+        Some(depths.verdict(simd))
     }
 }
 
