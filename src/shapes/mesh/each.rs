@@ -5,7 +5,7 @@ use super::Mesh;
 use super::leaf::{Margins, OfEight, Spot, filter};
 use super::query::{self, exactly, nearer, occluded};
 use super::seen::{OfSixteen, Seen, View, everywhere};
-use super::settle::settle;
+use super::settle::{Remembered, settle};
 use crate::bvh::{self, Bundle, Limits, RAYS, SIXTEENS, Start};
 use crate::{Hit, Interval, Ray};
 use fearless_simd::{Simd, dispatch, f32x8, f32x16, mask32x16, prelude::*, u32x16};
@@ -238,6 +238,7 @@ fn closest_with<S: Simd>(
     let nearests = Nearests {
         low: [[f32::INFINITY; 16]; SIXTEENS],
         spot: [[Spot::NOWHERE; 16]; SIXTEENS],
+        id: [[0; 16]; SIXTEENS],
         remembered: 0,
         settled: 0,
         hits,
@@ -255,6 +256,8 @@ struct Nearests<'a> {
     low: [[f32; 16]; SIXTEENS],
     /// Leaf and lane.
     spot: [[u32; 16]; SIXTEENS],
+    /// What the leaf has for its `id`: asked for at once, since by the end it may have left the cache.
+    id: [[u32; 16]; SIXTEENS],
     /// The rays that have one remembered, and those that have one settled.
     remembered: u32,
     settled: u32,
@@ -269,6 +272,9 @@ impl<S: Simd> Answers<S> for Nearests<'_> {
         let [low, t_max]: [f32x16<S>; 2] = [walk.answers.low[sixteen].simd_into(simd), rays.t_max.simd_into(simd)];
         let nearer = certain(simd, rays, verdict) & verdict.high.simd_lt(low);
         let farther = verdict.through & verdict.low.simd_gt(t_max);
+        let id = walk.mesh.leaves[spot.leaf as usize].id[spot.lane as usize & 7];
+        let ids = nearer.select(u32x16::splat(simd, id), walk.answers.id[sixteen].simd_into(simd));
+        walk.answers.id[sixteen] = ids.into();
         let spots = nearer.select(u32x16::splat(simd, spot.packed()), walk.answers.spot[sixteen].simd_into(simd));
         walk.answers.spot[sixteen] = spots.into();
         walk.answers.low[sixteen] = nearer.select(verdict.low, low).into();
@@ -298,6 +304,7 @@ impl<S: Simd> Answers<S> for Nearests<'_> {
         *of_ray = low;
         walk.answers.remembered |= 1 << ray;
         walk.answers.spot[ray / 16][lane] = spot.packed();
+        walk.answers.id[ray / 16][lane] = walk.mesh.leaves[spot.leaf as usize].id[spot.lane as usize & 7];
         if high < *t_max {
             *t_max = high;
         }
@@ -331,7 +338,7 @@ impl Walk<'_, Nearests<'_>> {
     /// Settles what is remembered.
     #[inline(always)]
     fn settle<S: Simd>(&mut self, simd: S) {
-        let Nearests { low, spot, remembered, settled, .. } = self.answers;
+        let Nearests { low, spot, id, remembered, settled, .. } = self.answers;
         let mut both = remembered & settled;
         while both != 0 {
             let ray = both.trailing_zeros() as usize % RAYS;
@@ -340,7 +347,8 @@ impl Walk<'_, Nearests<'_>> {
                 self.confirm(simd, Spot::of(spot[ray / 16][ray % 16]), ray);
             }
         }
-        settle(simd, self.mesh, self.rays, remembered & !settled, spot.as_flattened(), self.answers.hits);
+        let remembered = Remembered { which: remembered & !settled, spots: spot.as_flattened(), ids: id.as_flattened() };
+        settle(simd, self.mesh, self.rays, remembered, self.answers.hits);
     }
 }
 

@@ -31,7 +31,7 @@ pub(super) struct Leaf {
 impl Leaf {
     #[inline(always)]
     pub(super) fn number(&self, lane: usize) -> u32 {
-        self.id[lane] & NUMBER
+        number(self.id[lane])
     }
 
     #[inline(always)]
@@ -50,6 +50,12 @@ impl Leaf {
         let vertex = |i: usize| mesh.frame().world(column(&self.vertices[i % 3], lane));
         [vertex(first), vertex(first + 1), vertex(first + 2)]
     }
+}
+
+/// The triangle's number, of an `id`.
+#[inline(always)]
+pub(super) fn number(id: u32) -> u32 {
+    id & NUMBER
 }
 
 /// A triangle, by where it stands.

@@ -2,30 +2,41 @@
 
 use super::Mesh;
 use super::each::Stretch;
-use super::leaf::{ROTATION, Spot, UNCERTIFIED};
+use super::leaf::{ROTATION, Spot, UNCERTIFIED, number};
 use super::query::exactly;
 use crate::kernel::triangle::eight;
 use crate::{Hit, Interval, Ray};
 use fearless_simd::{Simd, f32x8, f64x4, f64x8, prelude::*};
 use glam::{DVec2, DVec3};
 
-/// Answers those `rays` that have a bit in `which` with what they hit at their `spots`, to the bit as [`exactly`] has it.
+/// What rays hit.
+#[derive(Clone, Copy)]
+pub(super) struct Remembered<'a> {
+    /// The rays that do.
+    pub(super) which: u32,
+    /// Where: leaf and lane.
+    pub(super) spots: &'a [u32],
+    /// The leaf's `id` of that lane.
+    pub(super) ids: &'a [u32],
+}
+
+/// Answers rays with what they are remembered to hit, to the bit as [`exactly`] has it.
 #[inline(always)]
 pub(super) fn settle<S: Simd>(
     simd: S,
     mesh: &Mesh,
     rays: &[Stretch],
-    mut which: u32,
-    spots: &[u32],
+    remembered: Remembered,
     hits: &mut [Option<Hit>],
 ) {
+    let mut which = remembered.which;
     while which != 0 {
         let count = which.count_ones();
         if count < FEWEST || UNCERTIFIED {
             let ray = which.trailing_zeros() as usize;
             which &= which - 1;
             let (ref asked, within) = rays[ray];
-            hits[ray] = exactly(simd, mesh, asked, within, Spot::of(spots[ray]));
+            hits[ray] = exactly(simd, mesh, asked, within, Spot::of(remembered.spots[ray]));
             continue;
         }
         let mut of = [0; 8];
@@ -36,7 +47,7 @@ pub(super) fn settle<S: Simd>(
             which = if others == 0 { which } else { others };
         }
         which = if count > 8 { which } else { 0 };
-        settle_eight(simd, mesh, rays, of, spots, hits);
+        settle_eight(simd, mesh, rays, of, remembered, hits);
     }
 }
 
@@ -72,7 +83,7 @@ fn two<S: Simd>(simd: S, a: &DVec3, b: &DVec3) -> f64x8<S> {
 
 /// The vertices of eight triangles, each in a register of its own.
 #[inline(always)]
-fn vertices<S: Simd>(simd: S, mesh: &Mesh, spots: &[Spot; 8]) -> [eight::Vectors<S>; 3] {
+fn vertices<S: Simd>(simd: S, mesh: &Mesh, spots: &[Spot; 8], ids: &[u32; 8]) -> [eight::Vectors<S>; 3] {
     if !mesh.exact {
         let mut vertices = [[DVec3::ZERO; 8]; 3];
         for (i, spot) in spots.iter().enumerate() {
@@ -87,8 +98,8 @@ fn vertices<S: Simd>(simd: S, mesh: &Mesh, spots: &[Spot; 8]) -> [eight::Vectors
     let frame = mesh.frame();
     let unscale = f64x8::splat(simd, frame.unscale);
     let mut turns = [0.0; 8];
-    for (turn, (leaf, lane)) in turns.iter_mut().zip(&leaves) {
-        *turn = (leaf.id[*lane] >> ROTATION) as f32;
+    for (turn, id) in turns.iter_mut().zip(ids) {
+        *turn = (id >> ROTATION) as f32;
     }
     let turns = widened(simd, turns);
     let (once, twice) = (turns.simd_eq(f64x8::splat(simd, 1.0)), turns.simd_eq(f64x8::splat(simd, 2.0)));
@@ -131,7 +142,7 @@ fn settle_eight<S: Simd>(
     mesh: &Mesh,
     rays: &[Stretch],
     of: [usize; 8],
-    spots: &[u32],
+    Remembered { spots, ids, .. }: Remembered,
     hits: &mut [Option<Hit>],
 ) {
     let mut rows = [f64x8::splat(simd, 0.0); 8];
@@ -139,11 +150,11 @@ fn settle_eight<S: Simd>(
         *row = self::row(simd, &rays[ray]);
     }
     let [ox, oy, oz, dx, dy, dz, min, max] = columns(rows);
-    let mut spot = [Spot::of(0); 8];
-    for (spot, &ray) in spot.iter_mut().zip(&of) {
-        *spot = Spot::of(spots[ray]);
+    let (mut spot, mut id) = ([Spot::of(0); 8], [0; 8]);
+    for (i, &ray) in of.iter().enumerate() {
+        (spot[i], id[i]) = (Spot::of(spots[ray]), ids[ray]);
     }
-    let vertices = vertices(simd, mesh, &spot);
+    let vertices = vertices(simd, mesh, &spot, &id);
     let eight::Eight { lambda, error, uv: [u, v], hit, unsure } = eight::intersect(
         simd,
         &eight::Rays {
@@ -154,7 +165,7 @@ fn settle_eight<S: Simd>(
         },
     );
     let [lambda, error, u, v]: [[f64; 8]; 4] = [lambda.into(), error.into(), u.into(), v.into()];
-    let found = |i: usize| Some(Hit { lambda: lambda[i], error: error[i], uv: DVec2::new(u[i], v[i]), part: spot[i].number(mesh) });
+    let found = |i: usize| Some(Hit { lambda: lambda[i], error: error[i], uv: DVec2::new(u[i], v[i]), part: number(id[i]) });
     if hit == 0xff {
         for i in 0..8 {
             hits[of[i]] = found(i);
