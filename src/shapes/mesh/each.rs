@@ -21,7 +21,7 @@ pub(super) fn closest(mesh: &Mesh, rays: &[Stretch], hits: &mut [Option<Hit>]) {
         rays,
         hits,
         |rays, hits| dispatch!(mesh.level.of_many(), simd => closest_with(simd, mesh, rays, &mut bundle, hits)),
-        |(ray, within)| query::closest(mesh, ray, *within),
+        |(ray, within), hit| query::find_closest(mesh, ray, *within, hit),
     );
 }
 
@@ -32,7 +32,7 @@ pub(super) fn any(mesh: &Mesh, rays: &[Stretch], hits: &mut [bool]) {
         rays,
         hits,
         |rays, hits| dispatch!(mesh.level.of_many(), simd => any_with(simd, mesh, rays, &mut bundle, hits)),
-        |(ray, within)| query::any(mesh, ray, *within),
+        |(ray, within), hit| *hit = query::any(mesh, ray, *within),
     );
 }
 
@@ -42,7 +42,7 @@ fn each<T>(
     rays: &[Stretch],
     hits: &mut [T],
     mut together: impl FnMut(&[Stretch; RAYS], &mut [T; RAYS]) -> bool,
-    alone: impl Fn(&Stretch) -> T,
+    alone: impl Fn(&Stretch, &mut T),
 ) {
     const MOST_PATIENT: u32 = 64;
     let (mut wait, mut patience) = (0, 0);
@@ -59,11 +59,11 @@ fn each<T>(
             patience = (2 * patience).clamp(1, MOST_PATIENT);
         }
         for (hit, ray) in hits.iter_mut().zip(rays) {
-            *hit = alone(ray);
+            alone(ray, hit);
         }
     }
     for (hit, ray) in of_rest.iter_mut().zip(rest) {
-        *hit = alone(ray);
+        alone(ray, hit);
     }
 }
 

@@ -12,17 +12,23 @@ use std::cmp::Ordering;
 
 /// The nearest hit; the lowest triangle of those met at exactly the same λ.
 pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
-    let asked = Asked::new(ray, within);
     // The one place for the answer on the way through all functions: returned, it would be copied by each.
     let mut hit = None;
+    find_closest(mesh, ray, within, &mut hit);
+    hit
+}
+
+/// [`closest`] where it is wanted.
+#[inline(always)]
+pub(super) fn find_closest(mesh: &Mesh, ray: &Ray, within: Interval, hit: &mut Option<Hit>) {
+    let asked = Asked::new(ray, within);
     dispatch!(mesh.level.token(), simd => {
         if is_baseline(simd) {
-            closest_apart(simd, mesh, &asked, &mut hit);
+            closest_apart(simd, mesh, &asked, hit);
         } else {
-            closest_with(simd, mesh, &asked, &mut hit);
+            closest_with(simd, mesh, &asked, hit);
         }
     });
-    hit
 }
 
 /// Whether these instructions need no function of their own. Then the query would be inlined into the one that dispatches,
