@@ -237,6 +237,46 @@ fn slices_from_a_surface_are_answered_as_their_rays_are() {
     assert!(hits_in_all > rays_in_all / 4);
 }
 
+/// Rays to a light inside of what they start from, so that they come from all sides and from near and far, in runs of neighbours.
+#[test]
+fn slices_to_a_light_in_the_middle_are_answered_as_their_rays_are() {
+    let mut random = Rng::new(31);
+    let (mut rays_in_all, mut hits_in_all) = (0, 0);
+    let meshes = [icosphere(3), torus(20), grid_cube(6), soup(&mut Rng::new(32), 500, 0.2)];
+    let far = moved(icosphere(3), 1e-3, DVec3::new(1e5, 2e5, -3e5));
+    for (positions, triangles) in meshes.into_iter().chain([far]) {
+        let mut mesh = Mesh::new(positions, triangles).unwrap();
+        let size = mesh.bounds().size().max_element();
+        for round in 0..200 {
+            let light = mesh.bounds().center() + 0.3 * size * random.in_cube(1.0);
+            let run = [6, 11, 32, 64][round % 4];
+            let mut way = DVec3::ZERO;
+            let rays: Vec<(Ray, Interval)> = (0..128)
+                .map(|i| {
+                    if i % run == 0 {
+                        way = size * random.unit() * [0.02, 0.4, 1.5][random.index(3)];
+                    }
+                    let from = light + way + 0.1 * way.length() * random.in_cube(1.0);
+                    (Ray::new(from, light - from), Interval::new(1e-9, 1.0))
+                })
+                .collect();
+            let mut occluded = vec![false; rays.len()];
+            for (level, simd) in Level::all() {
+                mesh.set_level(simd);
+                mesh.occludes_each(&rays, &mut occluded);
+                for (i, (ray, within)) in rays.iter().enumerate() {
+                    let alone = mesh.occludes(ray, *within);
+                    assert_eq!(occluded[i], alone, "{level}: ray {i}, {ray:?} {within:?}");
+                }
+            }
+            rays_in_all += rays.len();
+            hits_in_all += occluded.iter().filter(|&&met| met).count();
+        }
+    }
+    println!("{rays_in_all} rays to a light, {hits_in_all} hits, 0 differences");
+    assert!(hits_in_all > rays_in_all / 10 && hits_in_all < rays_in_all * 9 / 10);
+}
+
 /// From a point inside of closed meshes to vertices, points of edges and of faces, and from behind these back to that point.
 #[test]
 fn slices_do_not_leak() {

@@ -5,9 +5,10 @@
 
 use super::frame::Frame;
 use super::slab::{E, LENGTHS, NEAR, PLAIN_ERROR, SLAB, STEEPEST};
+use super::waiting::{Waiting, in_order, lane_of, t_of};
 use super::wide::{LEAF, Wide, WideNode, near_rows};
 use crate::{Interval, Ray};
-use fearless_simd::{Simd, f32x8, f32x16, f64x8, i32x8, mask32x8, prelude::*, u8x32};
+use fearless_simd::{Simd, f32x8, f32x16, f64x8, mask32x8, prelude::*};
 
 /// How many rays a bundle has.
 pub(crate) const RAYS: usize = 32;
@@ -436,91 +437,6 @@ impl<S: Simd> Bounds<S> {
     }
 }
 
-/// Where the lane stands in a key, whose other bits are those of t.
-const LANE: i32 = 7;
-
-/// Of t, before it loses its last bits to the lane: seven units in the last place are less.
-const ROUNDED: f32 = 1.0 / 524_288.0; // 2⁻¹⁹
-
-/// Keys of those lanes that are hit, the farthest first, and after them what means nothing. As signed integers they sort as t does,
-/// but for negative ones among themselves. By Batcher's network, without a branch.
-#[inline(always)]
-fn in_order<S: Simd>(simd: S, hits: mask32x8<S>, enter: f32x8<S>) -> [i32; 8] {
-    let t: i32x8<S> = enter.abs().mul_add(f32x8::splat(simd, -ROUNDED), enter).bitcast();
-    let lanes = i32x8::simd_from(simd, [0, 1, 2, 3, 4, 5, 6, 7]);
-    let keys = hits.select(t & i32x8::splat(simd, !LANE) | lanes, i32x8::splat(simd, i32::MIN));
-    let keys = exchange(simd, keys, turned(simd, keys, 1), 0b0101_0101);
-    let keys = exchange(simd, keys, turned(simd, keys, 3), 0b0011_0011);
-    let keys = exchange(simd, keys, turned(simd, keys, 1), 0b0101_0101);
-    let keys = exchange(simd, keys, keys.reverse(), 0b0000_1111);
-    let keys = exchange(simd, keys, turned(simd, keys, 2), 0b0011_0011);
-    exchange(simd, keys, turned(simd, keys, 1), 0b0101_0101).into()
-}
-
-/// The larger of the two in these lanes, the lesser in the others.
-#[inline(always)]
-fn exchange<S: Simd>(simd: S, a: i32x8<S>, b: i32x8<S>, larger: u64) -> i32x8<S> {
-    mask32x8::from_bitmask(simd, larger).select(a.max(b), a.min(b))
-}
-
-/// In lane i what was in lane i ^ `by`, which is less than four.
-#[inline(always)]
-fn turned<S: Simd>(simd: S, keys: i32x8<S>, by: u8) -> i32x8<S> {
-    let mut bytes = [0; 32];
-    for i in 0..32 {
-        bytes[i as usize] = (i ^ (by << 2)) & 15;
-    }
-    keys.swizzle_dyn_within_blocks(u8x32::simd_from(simd, bytes))
-}
-
-/// Boxes left to visit, by node and lane. What does not fit, which no sensible tree needs, goes to the heap.
-struct Waiting {
-    keys: [i32; ROOM + 8],
-    nodes: [u32; ROOM + 8],
-    len: usize,
-    spilled: Vec<(i32, u32)>,
-}
-
-const ROOM: usize = 40;
-
-impl Waiting {
-    #[inline(always)]
-    fn new() -> Self {
-        Self { keys: [0; ROOM + 8], nodes: [0; ROOM + 8], len: 0, spilled: Vec::new() }
-    }
-
-    /// Adds the first `count` boxes of `node`.
-    #[inline(always)]
-    fn push(&mut self, node: u32, count: u32, keys: [i32; 8]) {
-        if self.len > ROOM {
-            self.spill();
-        }
-        let at = self.len.min(ROOM);
-        self.keys[at..at + 8].copy_from_slice(&keys);
-        self.nodes[at..at + 8].copy_from_slice(&[node; 8]);
-        self.len = at + count as usize;
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn spill(&mut self) {
-        let entries = self.keys.iter().zip(&self.nodes).map(|(&key, &node)| (key, node));
-        self.spilled.extend(entries.take(self.len));
-        self.len = 0;
-    }
-
-    /// The last one.
-    #[inline(always)]
-    fn pop(&mut self) -> Option<(i32, u32)> {
-        if self.len == 0 {
-            return self.spilled.pop();
-        }
-        self.len -= 1;
-        let at = self.len.min(ROOM + 7);
-        Some((self.keys[at], self.nodes[at]))
-    }
-}
-
 /// A bundle, and what is done at the leaves.
 pub(crate) trait Together<S: Simd> {
     fn bundle(&self) -> &Bundle;
@@ -542,10 +458,10 @@ pub(crate) fn together<S: Simd>(simd: S, tree: &Wide, walk: &mut impl Together<S
         at = loop {
             let Some((key, node)) = waiting.pop() else { return };
             let bundle = walk.bundle();
-            if f32::from_bits((key & !LANE) as u32) > bundle.t_max {
+            if t_of(key) > bundle.t_max {
                 continue;
             }
-            let (node, lane) = (&nodes[node as usize], (key & LANE) as usize);
+            let (node, lane) = (&nodes[node as usize], lane_of(key));
             let rays = bundle.meet(simd, node, lane, &bounds.near);
             if rays == 0 {
                 continue;

@@ -19,6 +19,7 @@ mod slab;
 mod split;
 mod tasks;
 mod traverse;
+mod waiting;
 mod watch;
 mod wide;
 

@@ -120,8 +120,10 @@ impl<S: Simd> Double<S> {
             #[inline(always)]
             |i| {
                 let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-                let ((p, p_lo), (m, m_lo)) =
-                    (P::two_products::<S, _>(self.hi[j], other.hi[k]), P::two_products::<S, _>(self.hi[k], other.hi[j]));
+                let ((p, p_lo), (m, m_lo)) = (
+                    P::two_products::<S, _>(self.hi[j], other.hi[k]),
+                    P::two_products::<S, _>(self.hi[k], other.hi[j]),
+                );
                 let (hi, rounding) = two_diff(p, m);
                 let forth = self.hi[j] * other.lo[k] + self.lo[j] * other.hi[k];
                 let back = self.hi[k] * other.lo[j] + self.lo[k] * other.hi[j];
@@ -193,7 +195,8 @@ mod tests {
 
     #[inline(always)]
     fn gathered<S: Simd>(simd: S, cases: &[Case]) -> Rays<S> {
-        let number = |f: &dyn Fn(&Case) -> f64| -> f64x8<S> { [0, 1, 2, 3, 4, 5, 6, 7].map(|i| f(&cases[i])).simd_into(simd) };
+        let number =
+            |f: &dyn Fn(&Case) -> f64| -> f64x8<S> { [0, 1, 2, 3, 4, 5, 6, 7].map(|i| f(&cases[i])).simd_into(simd) };
         let vectors = |f: &dyn Fn(&Case) -> DVec3| [0, 1, 2].map(|axis| number(&|case| f(case)[axis]));
         Rays {
             origin: vectors(&|(ray, ..)| ray.origin),

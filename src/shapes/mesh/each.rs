@@ -142,7 +142,8 @@ impl<'a, A> Walk<'a, A> {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
             let [a, b] = &self.bundle.rays;
-            let (mut first, mut second) = (seen.triangle(simd, lane as usize, a), seen.triangle(simd, lane as usize, b));
+            let (mut first, mut second) =
+                (seen.triangle(simd, lane as usize, a), seen.triangle(simd, lane as usize, b));
             (first.maybe, second.maybe) = (first.maybe & rays, second.maybe & rays >> 16);
             if first.maybe | second.maybe == 0 {
                 continue;
@@ -347,7 +348,8 @@ impl Walk<'_, Nearests<'_>> {
                 self.confirm(simd, Spot::of(spot[ray / 16][ray % 16]), ray);
             }
         }
-        let remembered = Remembered { which: remembered & !settled, spots: spot.as_flattened(), ids: id.as_flattened() };
+        let remembered =
+            Remembered { which: remembered & !settled, spots: spot.as_flattened(), ids: id.as_flattened() };
         settle(simd, self.mesh, self.rays, remembered, self.answers.hits);
     }
 }

@@ -157,15 +157,11 @@ fn settle_eight<S: Simd>(
     let vertices = vertices(simd, mesh, &spot, &id);
     let eight::Eight { lambda, error, uv: [u, v], hit, unsure } = eight::intersect(
         simd,
-        &eight::Rays {
-            origin: [ox, oy, oz],
-            direction: [dx, dy, dz],
-            vertices,
-            within: [min, max],
-        },
+        &eight::Rays { origin: [ox, oy, oz], direction: [dx, dy, dz], vertices, within: [min, max] },
     );
     let [lambda, error, u, v]: [[f64; 8]; 4] = [lambda.into(), error.into(), u.into(), v.into()];
-    let found = |i: usize| Some(Hit { lambda: lambda[i], error: error[i], uv: DVec2::new(u[i], v[i]), part: number(id[i]) });
+    let found =
+        |i: usize| Some(Hit { lambda: lambda[i], error: error[i], uv: DVec2::new(u[i], v[i]), part: number(id[i]) });
     if hit == 0xff {
         for i in 0..8 {
             hits[of[i]] = found(i);
