@@ -54,6 +54,38 @@ pub fn dispatch_lanes<R>(fused: impl FnOnce(<FusedLanes as Lanes>::Cpu) -> R, po
     }
 }
 
+/// [`dispatch_lanes`] to one function of references, generic over the [`Product`](super::eft::Product) and given the proof:
+/// they are passed in registers, where a closure would be passed in memory.
+macro_rules! dispatch_function {
+    ($function:ident($($argument:ident: $type:ty),*) -> $answer:ty) => {{
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        let answer = {
+            fearless_simd::kernel!(
+                #[inline(always)]
+                fn fused(cpu: Avx2, $($argument: $type),*) -> $answer {
+                    $function::<$crate::kernel::eft::Fused>(cpu, $($argument),*)
+                }
+            );
+            /// Out of line: it would take the caller's registers and never run.
+            #[cold]
+            #[inline(never)]
+            fn portable($($argument: $type),*) -> $answer {
+                $function::<$crate::kernel::eft::Split>((), $($argument),*)
+            }
+            match fearless_simd::Level::new().as_avx2() {
+                Some(cpu) => fused(cpu, $($argument),*),
+                None => portable($($argument),*),
+            }
+        };
+        #[cfg(target_arch = "aarch64")]
+        let answer = $function::<$crate::kernel::eft::Fused>($crate::kernel::cpu::fused_lanes(), $($argument),*);
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
+        let answer = $function::<$crate::kernel::eft::Split>((), $($argument),*);
+        answer
+    }};
+}
+pub(super) use dispatch_function;
+
 /// Whether code compiled for the instructions of `simd` has fused multiply-add, known when it is compiled.
 #[inline(always)]
 pub fn has_fused<S: Simd>(simd: S) -> bool {

@@ -51,6 +51,12 @@ pub trait Lanes: Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Ou
         Self::new(cpu, [v.x, v.y, v.z, v.z])
     }
 
+    /// (z, x, y): turned twice.
+    #[inline(always)]
+    fn turned_back(cpu: Self::Cpu, v: DVec3) -> Self {
+        Self::new(cpu, [v.z, v.x, v.y, v.y])
+    }
+
     /// `x` in each lane, on the CPU of this.
     #[inline(always)]
     #[must_use]
@@ -79,16 +85,23 @@ pub trait Lanes: Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Ou
     /// The first two.
     #[must_use]
     fn low(self) -> Self::Half;
+    /// Two and two.
+    #[must_use]
+    fn joined(self, low: Self::Half, high: Self::Half) -> Self;
 
     /// The x, the y and the z of four vectors.
+    #[inline(always)]
     #[must_use]
-    fn columns(vectors: [Self; 4]) -> [Self; 3];
+    fn columns([a, b, c, d]: [Self; 4]) -> [Self; 3] {
+        let ([x, y, z], [t, u, v]) = (a.rows(b), c.rows(d));
+        [a.joined(x, t), a.joined(y, u), a.joined(z, v)]
+    }
 
     /// The largest |component| of four vectors.
     #[inline(always)]
     fn largest(vectors: [Self; 4]) -> Self {
-        let [x, y, z] = Self::columns(vectors.map(Self::abs));
-        x.max(y).max(z)
+        let [x, y, z] = Self::columns(vectors);
+        x.abs().max(y.abs()).max(z.abs())
     }
 }
 
@@ -114,10 +127,16 @@ impl<L: Lanes> Double<L> {
         Self { hi, lo }
     }
 
-    /// self × other: with M the product of the largest components |lo| ≤ 8.1uM, off by 28u²M. If both are `plain`, their
-    /// low parts zero, these cost nothing.
+    /// self × other: with M the product of the largest components |lo| ≤ 8.1uM, off by 28u²M.
     #[inline(always)]
-    pub(super) fn cross(self, other: Self, plain: bool) -> Self {
+    pub(super) fn cross(self, other: Self) -> Self {
+        let Self { hi, lo } = self.cross_turned_back(other, false);
+        Self { hi: hi.turned(), lo: lo.turned() }
+    }
+
+    /// [`Double::cross`] as (z, x, y). If both are `plain`, their low parts zero, these cost nothing.
+    #[inline(always)]
+    pub(super) fn cross_turned_back(self, other: Self, plain: bool) -> Self {
         let (at, bt) = (self.hi.turned(), other.hi.turned());
         let ((p, p_lo), (m, m_lo)) = (self.hi.two_product(bt), at.two_product(other.hi));
         let (hi, rounding) = two_diff(p, m);
@@ -127,7 +146,7 @@ impl<L: Lanes> Double<L> {
                 (self.hi * other.lo.turned() + self.lo * bt, at * other.lo + self.lo.turned() * other.hi);
             lo = lo + (forth - back);
         }
-        Self { hi: hi.turned(), lo: lo.turned() }
+        Self { hi, lo }
     }
 
     /// float × self: with M the product of the largest components |lo| ≤ 6.1uM, off by 16u²M.
@@ -245,10 +264,8 @@ impl<S: Simd> Lanes for f64x4<S> {
     }
 
     #[inline(always)]
-    fn columns([a, b, c, d]: [Self; 4]) -> [Self; 3] {
-        let cpu = a.simd;
-        let ([x, y, z], [t, u, v]) = (a.rows(b), c.rows(d));
-        [cpu.combine_f64x2(x, t), cpu.combine_f64x2(y, u), cpu.combine_f64x2(z, v)]
+    fn joined(self, low: f64x2<S>, high: f64x2<S>) -> Self {
+        self.simd.combine_f64x2(low, high)
     }
 
     /// By fused multiply-add.
@@ -357,8 +374,9 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn columns([a, b, c, d]: [Self; 4]) -> [Self; 3] {
-        [0, 1, 2].map(|i| Self([a.0[i], b.0[i], c.0[i], d.0[i]]))
+    fn joined(self, low: Plain<2>, high: Plain<2>) -> Self {
+        let ([a, b], [c, d]) = (low.0, high.0);
+        Self([a, b, c, d])
     }
 
     #[inline(always)]

@@ -23,12 +23,7 @@ use std::cmp::Ordering;
 #[must_use]
 pub fn intersect(ray: &Ray, point: DVec3, normal: DVec3, within: Interval) -> Option<Hit> {
     let (point, normal, within) = (&point, &normal, &within);
-    cpu::dispatch_lanes(
-        #[inline(always)]
-        move |cpu| fast::<Fused>(cpu, ray, point, normal, within),
-        #[inline(always)]
-        move || fast::<Split>((), ray, point, normal, within),
-    )
+    cpu::dispatch_function!(fast(ray: &Ray, point: &DVec3, normal: &DVec3, within: &Interval) -> Option<Hit>)
 }
 
 /// [`intersect`] with products' rounding errors found in the way of `P`: for callers that are inside

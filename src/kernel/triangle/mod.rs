@@ -19,6 +19,7 @@ use crate::{Hit, Interval, Ray};
 use fearless_simd::Simd;
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
+use std::hint::black_box;
 
 pub mod eight;
 
@@ -31,14 +32,9 @@ pub mod eight;
 #[inline]
 #[must_use]
 pub fn intersect(ray: &Ray, vertices: &[DVec3; 3], within: Interval) -> Option<Hit> {
-    // By reference: a closure that owned what it lends would be copied first.
+    // By reference: limits in registers would be moved to memory.
     let within = &within;
-    cpu::dispatch_lanes(
-        #[inline(always)]
-        move |cpu| fast::<Fused>(cpu, ray, vertices, within),
-        #[inline(always)]
-        move || fast::<Split>((), ray, vertices, within),
-    )
+    cpu::dispatch_function!(fast(ray: &Ray, vertices: &[DVec3; 3], within: &Interval) -> Option<Hit>)
 }
 
 /// [`intersect`] with products' rounding errors found in the way of `P`: for callers that are inside
@@ -51,26 +47,25 @@ pub fn intersect_with<P: Product>(ray: &Ray, vertices: &[DVec3; 3], within: Inte
 
 #[inline(always)]
 fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3; 3], within: &Interval) -> Option<Hit> {
-    let products = Products::<P>::new(cpu, ray, vertices, false);
+    let products = Products::<P>::new::<true>(cpu, ray, vertices, false);
     let &Products { det, su, sv, ref sizes, .. } = &products;
+    let uncertain = || closely(ray, vertices, within);
     if !sizes.are_ordinary() {
-        return closely(ray, vertices, within);
+        return uncertain();
     }
     let bound = TRIANGLE_SIDES * sizes.of_sides() + VANISHED;
-    // Turned to the ray: a branch on the orientation would be foretold by nothing.
-    let (least, most) = extremes(su, sv, (det - su) - sv);
-    let (least, most) = if det < 0.0 { (-most, -least) } else { (least, most) };
-    if (least < -bound) & (most > bound) {
+    let agreement = agreement(su, sv, (det - su) - sv);
+    if agreement < -bound {
         return None;
     }
-    let agreed = least > bound;
+    let agreed = agreement > bound;
     if !agreed {
-        return closely(ray, vertices, within);
+        return uncertain();
     }
     // Begun early: what follows waits for it.
     let inverse = 1.0 / det;
     if !products.are_known() || bound * inverse.abs() > WEIGHT {
-        return closely(ray, vertices, within);
+        return uncertain();
     }
     let hit = products.hit(inverse);
     let (from, to) = (hit.lambda - hit.error, hit.lambda + hit.error);
@@ -80,7 +75,15 @@ fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3;
     if (to < within.min) | (from > within.max) {
         return None;
     }
-    closely(ray, vertices, within)
+    uncertain()
+}
+
+/// How far all three are from zero on one side of it; below zero by how far they are on both. NaN if the third is.
+#[inline(always)]
+fn agreement(u: f64, v: f64, w: f64) -> f64 {
+    let (least, most) = extremes(u, v, w);
+    // Without a branch on the orientation, which would be foretold by nothing.
+    if least > -most { least } else { -most }
 }
 
 /// The hit of a ray that a mesh's filter has proved to meet the triangle at a λ that counts, to the bit as [`intersect_with`] has it; `None` where
@@ -102,7 +105,7 @@ fn hit_of_passed<P: Product>(
     vertices: &[DVec3; 3],
     plain: bool,
 ) -> Option<Hit> {
-    let products = Products::<P>::new(cpu, ray, vertices, plain);
+    let products = Products::<P>::new::<false>(cpu, ray, vertices, plain);
     let bound = TRIANGLE_SIDES * products.sizes.of_sides() + VANISHED;
     let inverse = 1.0 / products.det;
     let certain = products.sizes.are_ordinary() & (bound * inverse.abs() <= WEIGHT);
@@ -131,19 +134,25 @@ struct Products<P: Product> {
 }
 
 impl<P: Product> Products<P> {
+    /// `DECIDE`: there will be a branch on them. What n is made of would be kept in memory till after it, and takes longer
+    /// there than n's low part does now.
     #[inline(always)]
-    fn new(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3; 3], plain: bool) -> Self {
-        let lanes = |v: DVec3| P::Lanes::of(cpu, v);
-        let (o, d, [a, b, c]) = (lanes(ray.origin), lanes(ray.direction), vertices.map(lanes));
-        // u·e₁ + v·e₂ − λ·d = s
-        let (e1, e2, s) = (Double::difference(b, a), Double::difference(c, a), Double::difference(o, a));
-        let (n, q) = (e1.cross(e2, plain), d.cross(s.hi));
+    fn new<const DECIDE: bool>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3; 3], plain: bool) -> Self {
+        // u·e₁ + v·e₂ − λ·d = s. Crossing leaves components turned: what is multiplied with n is turned as n is.
+        let (lanes, turned_back) = (|v: DVec3| P::Lanes::of(cpu, v), |v: DVec3| P::Lanes::turned_back(cpu, v));
+        let ([a, b, c], (o, d)) = (vertices.map(lanes), (turned_back(ray.origin), turned_back(ray.direction)));
+        let (e1, e2, s) =
+            (Double::difference(b, a), Double::difference(c, a), Double::difference(o, turned_back(vertices[0])));
+        let n = e1.cross_turned_back(e2, plain);
+        let n = if DECIDE { Double { hi: n.hi, lo: black_box(n.lo) } } else { n };
         let (nd, ns) = (n.times_float(d), n.times(s));
-        let [x, y, z] = Lanes::columns([nd.hi, ns.hi, q * e2.hi, q * e1.hi]);
-        let (xy, rounding) = two_sum(x, y);
-        let (forms, more_rounding) = two_sum(xy, z);
+        // (y, z, x), as the edges are turned for n.
+        let q = d * s.hi.turned() - lanes(ray.direction) * s.hi;
+        let ([z, x, y], [v, w, u]) = (nd.hi.rows(ns.hi), (q * e2.hi.turned()).rows(q * e1.hi.turned()));
+        let (xy, rounding) = two_sum(d.joined(x, u), d.joined(y, v));
+        let (forms, more_rounding) = two_sum(xy, d.joined(z, w));
         let [det, height, su, minus_sv] = forms.to_array();
-        let [lx, ly, lz] = nd.lo.rows(ns.lo);
+        let [lz, lx, ly] = nd.lo.rows(ns.lo);
         let low = (rounding + more_rounding).low() + ((lx + ly) + lz);
         let (sizes, m_d_s) = Sizes::new([d, s.hi, e1.hi, e2.hi]);
         Self { det, height, su, sv: -minus_sv, low, present: forms.low().abs(), sizes, m_d_s }
@@ -268,7 +277,7 @@ impl Forms {
         let lanes = |v: DVec3| P::Lanes::of(cpu, v);
         let (o, d, [a, b, c]) = (lanes(ray.origin), lanes(ray.direction), vertices.map(lanes));
         let (e1, e2, s) = (Double::difference(b, a), Double::difference(c, a), Double::difference(o, a));
-        let (n, q) = (e1.cross(e2, false), s.crossed_by(d));
+        let (n, q) = (e1.cross(e2), s.crossed_by(d));
         let products = [n.times_float(d), q.times(e2), q.times(e1), n.times(s)];
         (Double::sums(products), Sizes::new([d, s.hi, e1.hi, e2.hi]).0)
     }
