@@ -72,13 +72,6 @@ pub trait Lanes: Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Ou
         self.like([y, z, x, w])
     }
 
-    /// self × other.
-    #[inline(always)]
-    #[must_use]
-    fn cross(self, other: Self) -> Self {
-        (self * other.turned() - self.turned() * other).turned()
-    }
-
     /// The x, the y and the z of two vectors.
     #[must_use]
     fn rows(self, other: Self) -> [Self::Half; 3];
