@@ -16,7 +16,7 @@ pub(super) type Stretch = (Ray, Interval);
 
 /// `hits[i]` becomes the nearest hit of `rays[i]`.
 pub(super) fn closest(mesh: &Mesh, rays: &[Stretch], hits: &mut [Option<Hit>]) {
-    let mut bundle = Bundle::EMPTY;
+    let mut bundle = None;
     each(
         rays,
         hits,
@@ -27,7 +27,7 @@ pub(super) fn closest(mesh: &Mesh, rays: &[Stretch], hits: &mut [Option<Hit>]) {
 
 /// `hits[i]` becomes whether `rays[i]` hits anything.
 pub(super) fn any(mesh: &Mesh, rays: &[Stretch], hits: &mut [bool]) {
-    let mut bundle = Bundle::EMPTY;
+    let mut bundle = None;
     each(
         rays,
         hits,
@@ -38,7 +38,7 @@ pub(super) fn any(mesh: &Mesh, rays: &[Stretch], hits: &mut [bool]) {
 
 /// A bundle at a time by `together`, which may refuse, the others one by one. After a refusal bundles are tried ever more
 /// seldom, so that rays without any order cost no more than alone.
-fn each<T>(
+fn each<T: Copy + Default>(
     rays: &[Stretch],
     hits: &mut [T],
     mut together: impl FnMut(&[Stretch; RAYS], &mut [T; RAYS]) -> bool,
@@ -62,25 +62,40 @@ fn each<T>(
             alone(ray, hit);
         }
     }
+    if rest.len() >= FEWEST && wait == 0 && (go_together(rest) || end_together(rest)) {
+        // The last of them stands for those that are not there.
+        let (mut rays, mut answers) = ([rest[rest.len() - 1]; RAYS], [T::default(); RAYS]);
+        rays[..rest.len()].copy_from_slice(rest);
+        if together(&rays, &mut answers) {
+            of_rest.copy_from_slice(&answers[..rest.len()]);
+            return;
+        }
+    }
     for (hit, ray) in of_rest.iter_mut().zip(rest) {
         alone(ray, hit);
     }
 }
 
+/// Fewer rays than this are no bundle.
+const FEWEST: usize = 8;
+
 /// A first look that costs next to nothing: whether a few directions are alike. [`Bundle::take`] looks at all.
-fn go_together(rays: &[Stretch; RAYS]) -> bool {
+fn go_together(rays: &[Stretch]) -> bool {
     let first = rays[0].0.direction;
-    (1..4).all(|i| is_near(first, rays[i * (RAYS - 1) / 3].0.direction))
+    (1..4).all(|i| is_near(first, rays[i * (rays.len() - 1) / 3].0.direction))
 }
 
 /// Alike, whether the rays may end at one place, and most come there the way their neighbours do: they start at surfaces, here and
 /// there at another than the one before.
-fn end_together(rays: &[Stretch; RAYS]) -> bool {
+fn end_together(rays: &[Stretch]) -> bool {
     let end = |(ray, within): &Stretch| ray.origin + within.max * ray.direction;
-    let (first, last) = (end(&rays[0]), end(&rays[RAYS - 1]));
+    let (first, last) = (end(&rays[0]), end(&rays[rays.len() - 1]));
     let way = rays[0].1.max.abs() * rays[0].0.direction.abs().max_element();
-    let neighbours = |i: &usize| is_near(rays[*i].0.direction, rays[i + 1].0.direction);
-    (first - last).abs().max_element() <= way * 1e-5 && [3, 12, 19, 28].iter().filter(|i| neighbours(i)).count() >= 3
+    let neighbours = |i: &usize| {
+        let i = i * rays.len() / 5;
+        is_near(rays[i].0.direction, rays[i + 1].0.direction)
+    };
+    (first - last).abs().max_element() <= way * 1e-5 && (1..5).filter(neighbours).count() >= 3
 }
 
 fn is_near(a: DVec3, b: DVec3) -> bool {
@@ -229,10 +244,14 @@ fn closest_with<S: Simd>(
     simd: S,
     mesh: &Mesh,
     rays: &[Stretch; RAYS],
-    bundle: &mut Bundle,
+    bundle: &mut Option<Bundle>,
     hits: &mut [Option<Hit>; RAYS],
 ) -> bool {
-    if !(go_together(rays) && bundle.take(simd, mesh.frame(), rays, Start::Origin)) {
+    if !go_together(rays) {
+        return false;
+    }
+    let bundle = bundle.get_or_insert_with(|| Bundle::EMPTY);
+    if !bundle.take(simd, mesh.frame(), rays, Start::Origin) {
         return false;
     }
     *hits = [None; RAYS];
@@ -360,12 +379,17 @@ fn any_with<S: Simd>(
     simd: S,
     mesh: &Mesh,
     rays: &[Stretch; RAYS],
-    bundle: &mut Bundle,
+    bundle: &mut Option<Bundle>,
     hits: &mut [bool; RAYS],
 ) -> bool {
+    let (to_one_place, alike) = (end_together(rays), go_together(rays));
+    if !(to_one_place || alike) {
+        return false;
+    }
+    let bundle = bundle.get_or_insert_with(|| Bundle::EMPTY);
     // Rays to a light, from the light; t is then `max` − λ.
-    let to_one_place = end_together(rays) && bundle.take(simd, mesh.frame(), rays, Start::End);
-    if !(to_one_place || go_together(rays) && bundle.take(simd, mesh.frame(), rays, Start::Origin)) {
+    let from_end = to_one_place && bundle.take(simd, mesh.frame(), rays, Start::End);
+    if !(from_end || alike && bundle.take(simd, mesh.frame(), rays, Start::Origin)) {
         return false;
     }
     *hits = [false; RAYS];
