@@ -1,9 +1,10 @@
-//! The triangle's signs in 64-bit integers: exact, and faster than anything inexact that must look twice.
+//! The signs of triangles and of a sphere's tangents in 64-bit integers: exact, and faster than anything inexact that must look twice.
 //!
-//! Where a ray meets an edge or a vertex *exactly*, the numbers are short: vertices on a grid, or single-precision
-//! vertices, seen along a tidy direction. All coordinates are then integers of one power of two, and the edge functions
+//! Where a ray meets an edge or a vertex or touches a sphere *exactly*, the numbers are short: vertices on a grid, or
+//! single-precision vertices, seen along a tidy direction. All coordinates are then integers of one power of two, and the edge functions
 //! fit 192 bits.
 
+use super::float::power;
 use crate::Ray;
 use glam::DVec3;
 use std::cmp::Ordering;
@@ -24,6 +25,11 @@ fn extent(x: f64) -> (i32, i32) {
 
 /// The vectors as integers of one power of two, if they fit.
 fn integers<const N: usize>(vectors: [DVec3; N], bits: i32) -> Option<[Integers; N]> {
+    multiples(vectors, bits).map(|(vectors, _)| vectors)
+}
+
+/// The vectors as integers, if they fit, and of which power of two.
+fn multiples<const N: usize>(vectors: [DVec3; N], bits: i32) -> Option<([Integers; N], i32)> {
     let (mut top, mut bottom) = (i32::MIN, i32::MAX);
     for v in &vectors {
         for x in v.to_array() {
@@ -36,13 +42,13 @@ fn integers<const N: usize>(vectors: [DVec3; N], bits: i32) -> Option<[Integers;
     }
     // 2^−bottom must be a float itself.
     if top == i32::MIN {
-        return Some([[0; 3]; N]);
+        return Some(([[0; 3]; N], 0));
     }
     if top - bottom > bits || !(-1000..=1000).contains(&bottom) {
         return None;
     }
     let scale = f64::from_bits(((1023 - bottom) as u64) << 52);
-    Some(vectors.map(|v| v.to_array().map(|x| (x * scale) as i64)))
+    Some((vectors.map(|v| v.to_array().map(|x| (x * scale) as i64)), bottom))
 }
 
 fn difference(a: Integers, b: Integers) -> Integers {
@@ -111,4 +117,22 @@ pub(super) fn edge(ray: &Ray, a: DVec3, b: DVec3) -> Option<Ordering> {
     let [o, a, b] = integers([ray.origin, a, b], BITS)?;
     let [d] = integers([ray.direction], BITS + 1)?;
     Some(dot(cross(d, difference(a, o)), difference(b, a)).sign())
+}
+
+/// |d|²r² − |f × d|² as an unevaluated sum, to 2⁻¹⁰⁶ of itself and zero only if it is that, if the numbers are short enough.
+/// r²|d|² must be in 2^±256.
+///
+/// |f|, r < 2ᴮ and |d| < 2ᴳ with B + G ≤ 61: f × d fits 62 bits, both squares 125.
+pub(super) fn discriminant(f: DVec3, d: DVec3, r: f64) -> Option<(f64, f64)> {
+    const TOGETHER: i32 = 61;
+    let ([d], d_exponent) = multiples([d], TOGETHER / 2)?;
+    let longest = d.iter().fold(0, |longest, x| longest | x.unsigned_abs());
+    let bits = TOGETHER - (64 - longest.leading_zeros() as i32);
+    let ([f, [r, ..]], exponent) = multiples([f, DVec3::new(r, 0.0, 0.0)], bits)?;
+    let minor = |i: usize, j: usize| f[i] * d[j] - f[j] * d[i];
+    let square = |x: i64| i128::from(x) * i128::from(x);
+    let w2 = square(minor(1, 2)) + square(minor(2, 0)) + square(minor(0, 1));
+    let value = square(r) * (square(d[0]) + square(d[1]) + square(d[2])) - w2;
+    let (hi, unit) = (value as f64, power(2 * (exponent + d_exponent)));
+    Some((hi * unit, (value - hi as i128) as f64 * unit))
 }

@@ -2,12 +2,13 @@
 //!
 //! With f = origin − center: A = |d|², b = f·d, D = r²A − |f × d|² (Lagrange's form of b² − AC, whose error grows with
 //! |f|, not with |f|²), λ = (−b ∓ √D)/A, then one Newton step with the residual |f + λd|² − r² in double-double, whose
-//! slope at the root is ∓2√D. Rays that start next to the sphere have a way of their own, `near.rs`. docs/numerics.md §5
-//! proves every constant.
+//! slope at the root is ∓2√D. Rays that start next to the sphere have a way of their own, `near.rs`, and so have those that
+//! graze it, `grazing.rs`. docs/numerics.md §5 proves every constant.
 //!
 //! Close to Haines, Günther, Akenine-Möller 2019 (Ray Tracing Gems ch. 7) in the discriminant; the step, the bounds and
 //! the exact refinement are this crate's.
 
+mod grazing;
 mod near;
 
 use super::bound::U;
@@ -102,7 +103,7 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
         if lambda - error > within.max {
             return None;
         }
-        return cold();
+        return settle(ray, center.x, center.y, center.z, r, within.min, within.max);
     }
     None
 }
@@ -137,10 +138,30 @@ fn step<P: Product>(f: &Pair, d: DVec3, r: f64, root: f64, slope: f64, first: f6
     quick_two_sum(first, -slope * 0.5 * (1.0 / root) * residual)
 }
 
-/// Scalars, so that the caller's vectors stay in registers.
+/// What is left: mostly rays that graze. Scalars, so that the caller's vectors stay in registers.
 #[cold]
 #[inline(never)]
 fn refine(ray: &Ray, x: f64, y: f64, z: f64, radius: f64, min: f64, max: f64) -> Option<Hit> {
+    let (center, within) = (DVec3::new(x, y, z), Interval { min, max });
+    if is_ordinary(ray.origin - center, ray.direction, radius) {
+        let answer = cpu::dispatch(
+            #[inline(always)]
+            move || grazing::nearest::<Fused>(ray, center, radius, within),
+            #[inline(always)]
+            move || grazing::nearest::<Split>(ray, center, radius, within),
+        );
+        if let Ok(answer) = answer {
+            tally::refined();
+            return answer;
+        }
+    }
+    settle(ray, x, y, z, radius, min, max)
+}
+
+/// By polynomials alone: any range, and λ next to a limit.
+#[cold]
+#[inline(never)]
+fn settle(ray: &Ray, x: f64, y: f64, z: f64, radius: f64, min: f64, max: f64) -> Option<Hit> {
     tally::refined();
     let (center, within) = (DVec3::new(x, y, z), Interval { min, max });
     if !accepts(ray, center, radius) || within.is_empty() {
@@ -209,7 +230,7 @@ mod tests {
     use super::*;
 
     /// f = x₀..₂ over 2^(10·x₇), d = x₃..₅, r from |f × d|/|d| and x₆: from clear hits to grazing ones.
-    fn setting(x: &[f64]) -> Option<(DVec3, DVec3, DVec3, f64)> {
+    pub(super) fn setting(x: &[f64]) -> Option<(DVec3, DVec3, DVec3, f64)> {
         let (c, d) = (DVec3::new(x[8], x[9], x[10]), DVec3::new(x[3], x[4], x[5]));
         let o = c + DVec3::new(x[0], x[1], x[2]) * 2f64.powf(10.0 * x[7]);
         let r = (o - c).cross(d).length() / d.length() * (1.0 + x[6].abs().powi(6));
@@ -217,7 +238,7 @@ mod tests {
     }
 
     /// A, b, C, D exactly.
-    fn polynomial(o: DVec3, c: DVec3, d: DVec3, r: f64) -> [Rational; 4] {
+    pub(super) fn polynomial(o: DVec3, c: DVec3, d: DVec3, r: f64) -> [Rational; 4] {
         let (f, d, r) = (minus(o, c), exact(d), Rational::try_from(r).unwrap());
         let w = cross3(&f, &d);
         let (a, r2) = (dot3(&d, &d), &r * &r);

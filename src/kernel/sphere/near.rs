@@ -60,7 +60,7 @@ fn ahead<P: Product>(ray: &Ray, x: f64, r: f64, y: f64, min: f64, z: f64, max: f
     let (f, d, within) = (Pair::difference(ray.origin, DVec3::new(x, y, z)), ray.direction, Interval { min, max });
     let mut c = Excess::new::<P>(&f, r);
     if c.hi.abs() <= c.error && Excess::is_zero::<P>(&f, r) {
-        c = Excess { hi: 0.0, lo: 0.0, error: 0.0 };
+        c = Excess::ZERO;
     }
     let roots = Roots::new::<P>(&f, d, &c);
     if (within.min >= 0.0) & roots.known {
@@ -106,7 +106,7 @@ fn again(ray: &Ray, x: f64, y: f64, z: f64, r: f64, min: f64, max: f64) -> Optio
 }
 
 /// Where a root lies against an interval.
-enum Place {
+pub(super) enum Place {
     Before,
     Inside(Hit),
     Beyond,
@@ -114,15 +114,15 @@ enum Place {
 }
 
 /// λ = hi + lo to within `rest`.
-struct Root {
-    hi: f64,
-    lo: f64,
-    rest: f64,
+pub(super) struct Root {
+    pub(super) hi: f64,
+    pub(super) lo: f64,
+    pub(super) rest: f64,
 }
 
 impl Root {
     #[inline(always)]
-    fn place(&self, ray: &Ray, r: f64, within: Interval) -> Place {
+    pub(super) fn place(&self, ray: &Ray, r: f64, within: Interval) -> Place {
         let (lambda, error) = (self.hi, (self.lo.abs() + self.rest) * INFLATE);
         // What is promised: the last bit, or that of 2⁻⁴⁰ of the coordinates. Mostly the radius is large enough.
         let fine = |size: f64| self.rest * (1.75 * taxicab(ray.direction)) <= 0.5 * U * FINE * size;
@@ -133,7 +133,7 @@ impl Root {
             Place::Inside(Hit { lambda, error, uv: DVec2::ZERO, part: 0 })
         } else if lambda - error > within.max {
             Place::Beyond
-        } else if lambda + error < within.min {
+        } else if (lambda + error < within.min) | (error == 0.0) & (lambda <= within.min) {
             Place::Before
         } else {
             Place::Unknown
@@ -142,7 +142,7 @@ impl Root {
 }
 
 /// What both roots are made of.
-struct Roots {
+pub(super) struct Roots {
     b: f64,
     b_lo: f64,
     /// 1/2b
@@ -153,13 +153,15 @@ struct Roots {
 }
 
 /// C = |f|² − r² as hi + lo, off by at most `error`.
-struct Excess {
+pub(super) struct Excess {
     hi: f64,
     lo: f64,
     error: f64,
 }
 
 impl Excess {
+    pub(super) const ZERO: Self = Self { hi: 0.0, lo: 0.0, error: 0.0 };
+
     #[inline(always)]
     fn new<P: Product>(f: &Pair, r: f64) -> Self {
         let (hi, lo) = f.squared_less_pair::<P>(r);
@@ -168,7 +170,7 @@ impl Excess {
 
     /// Zero on the sphere: whether it is that, for certain.
     #[inline(always)]
-    fn is_zero<P: Product>(f: &Pair, r: f64) -> bool {
+    pub(super) fn is_zero<P: Product>(f: &Pair, r: f64) -> bool {
         let square = |x: f64| P::two_product(x, x);
         let ((x, x_lo), (y, y_lo), (z, z_lo), (r2, r_lo)) = (square(f.hi.x), square(f.hi.y), square(f.hi.z), square(r));
         let ((s, s_lo), (t, t_lo)) = (two_sum(x, y), two_diff(z, r2));
@@ -210,7 +212,7 @@ impl Excess {
 
 impl Roots {
     #[inline(always)]
-    fn new<P: Product>(f: &Pair, d: DVec3, c: &Excess) -> Self {
+    pub(super) fn new<P: Product>(f: &Pair, d: DVec3, c: &Excess) -> Self {
         let (b, b_lo) = f.dot_float::<P>(d);
         let (b, b_lo) = quick_two_sum(b, b_lo);
         let half = 0.5 / b;
@@ -226,7 +228,7 @@ impl Roots {
     }
 
     #[inline(always)]
-    fn near<P: Product>(&self, c: &Excess) -> Root {
+    pub(super) fn near<P: Product>(&self, c: &Excess) -> Root {
         let (&Self { b, b_lo, half, .. }, (first, more)) = (self, self.first(c));
         // One step of the division.
         let rest = P::remainder(-c.hi, first, 2.0 * b) - (c.lo + 2.0 * (first * b_lo));
@@ -237,7 +239,7 @@ impl Roots {
 
     /// −2b/A less the near one.
     #[inline(always)]
-    fn far<P: Product>(&self, c: &Excess, d: DVec3, r: f64) -> Root {
+    pub(super) fn far<P: Product>(&self, c: &Excess, d: DVec3, r: f64) -> Root {
         let (&Self { b, b_lo, half, .. }, (near, more)) = (self, self.first(c));
         let (a, a_lo) = close_dot::<P>(d, d);
         let inverse = 1.0 / a;
