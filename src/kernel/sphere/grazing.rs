@@ -6,7 +6,7 @@ use super::super::eft::{Product, two_diff, two_sum};
 use super::super::fixed;
 use super::super::pair::{Pair, close_dot, plain_dot, taxicab};
 use super::super::section::Undecided;
-use super::near::{Excess, Place, Root, Roots};
+use super::near::{Excess, Root, Roots, first_inside};
 use crate::hit::Hit;
 use crate::interval::Interval;
 use crate::ray::Ray;
@@ -53,25 +53,6 @@ pub(super) fn nearest<P: Product>(
         return Ok(None);
     }
     first_inside(line.roots::<P>(discriminant, 0.0, line.b.abs()), ray, r, within)
-}
-
-/// Of roots in order.
-#[inline(always)]
-fn first_inside<const N: usize>(
-    roots: [Root; N],
-    ray: &Ray,
-    r: f64,
-    within: Interval,
-) -> Result<Option<Hit>, Undecided> {
-    for root in roots {
-        match root.place(ray, r, within) {
-            Place::Inside(hit) => return Ok(Some(hit)),
-            Place::Beyond => return Ok(None),
-            Place::Before => {}
-            Place::Unknown => return Err(Undecided),
-        }
-    }
-    Ok(None)
 }
 
 /// A and b in double-double, Σ|fᵢdᵢ|.

@@ -9,7 +9,7 @@ use super::super::cpu;
 use super::super::eft::{Fused, Product, Split, quick_two_sum, two_diff, two_sum};
 use super::super::float::power;
 use super::super::pair::{Pair, close_dot, plain_dot, taxicab};
-use super::super::section::FINE;
+use super::super::section::{FINE, Undecided};
 use crate::hit::Hit;
 use crate::interval::Interval;
 use crate::ray::Ray;
@@ -58,10 +58,7 @@ pub(super) fn intersect(ray: &Ray, x: f64, y: f64, z: f64, r: f64, min: f64, max
 #[inline(always)]
 fn ahead<P: Product>(ray: &Ray, x: f64, r: f64, y: f64, min: f64, z: f64, max: f64) -> Option<Hit> {
     let (f, d, within) = (Pair::difference(ray.origin, DVec3::new(x, y, z)), ray.direction, Interval { min, max });
-    let mut c = Excess::new::<P>(&f, r);
-    if c.hi.abs() <= c.error && Excess::is_zero::<P>(&f, r) {
-        c = Excess::ZERO;
-    }
+    let c = Excess::or_zero::<P>(&f, r);
     let roots = Roots::new::<P>(&f, d, &c);
     if (within.min >= 0.0) & roots.known {
         // The near root lies behind the origin if C has the sign of b, on it if C is zero; the far one if b is above zero.
@@ -82,31 +79,42 @@ fn ahead<P: Product>(ray: &Ray, x: f64, r: f64, y: f64, min: f64, z: f64, max: f
     again(ray, x, y, z, r, within.min, within.max)
 }
 
-/// Any interval, and C however small.
+/// Any interval, and C however small: as well known as it is for λ ≥ 0, if that will do, so that λ is the same.
 #[cold]
 #[inline(never)]
 fn again(ray: &Ray, x: f64, y: f64, z: f64, r: f64, min: f64, max: f64) -> Option<Hit> {
-    let (f, d, within) = (Pair::difference(ray.origin, DVec3::new(x, y, z)), ray.direction, Interval { min, max });
-    let c = Excess::closer(&f, r);
-    let roots = Roots::new::<Split>(&f, d, &c);
-    let refine = || super::refine(ray, x, y, z, r, min, max);
+    let (f, within) = (Pair::difference(ray.origin, DVec3::new(x, y, z)), Interval { min, max });
+    let answer = in_order(&f, ray, r, &Excess::or_zero::<Split>(&f, r), within);
+    answer
+        .or_else(|Undecided| in_order(&f, ray, r, &Excess::closer(&f, r), within))
+        .unwrap_or_else(|Undecided| super::refine(ray, x, y, z, r, min, max))
+}
+
+fn in_order(f: &Pair, ray: &Ray, r: f64, c: &Excess, within: Interval) -> Result<Option<Hit>, Undecided> {
+    let roots = Roots::new::<Split>(f, ray.direction, c);
     if !roots.known {
-        return refine();
+        return Err(Undecided);
     }
-    let (near, far) = (roots.near::<Split>(&c), roots.far::<Split>(&c, d, r));
-    for root in if roots.b > 0.0 { [far, near] } else { [near, far] } {
+    let (near, far) = (roots.near::<Split>(c), roots.far::<Split>(c, ray.direction, r));
+    first_inside(if roots.b > 0.0 { [far, near] } else { [near, far] }, ray, r, within)
+}
+
+/// The first of two roots in order that lies inside `within`.
+#[inline(always)]
+pub(super) fn first_inside(roots: [Root; 2], ray: &Ray, r: f64, within: Interval) -> Result<Option<Hit>, Undecided> {
+    for root in roots {
         match root.place(ray, r, within) {
-            Place::Inside(hit) => return Some(hit),
-            Place::Beyond => return None,
+            Place::Inside(hit) => return Ok(Some(hit)),
+            Place::Beyond => return Ok(None),
             Place::Before => {}
-            Place::Unknown => return refine(),
+            Place::Unknown => return Err(Undecided),
         }
     }
-    None
+    Ok(None)
 }
 
 /// Where a root lies against an interval.
-pub(super) enum Place {
+enum Place {
     Before,
     Inside(Hit),
     Beyond,
@@ -122,7 +130,7 @@ pub(super) struct Root {
 
 impl Root {
     #[inline(always)]
-    pub(super) fn place(&self, ray: &Ray, r: f64, within: Interval) -> Place {
+    fn place(&self, ray: &Ray, r: f64, within: Interval) -> Place {
         let (lambda, error) = (self.hi, (self.lo.abs() + self.rest) * INFLATE);
         // What is promised: the last bit, or that of 2⁻⁴⁰ of the coordinates. Mostly the radius is large enough.
         let fine = |size: f64| self.rest * (1.75 * taxicab(ray.direction)) <= 0.5 * U * FINE * size;
@@ -166,6 +174,13 @@ impl Excess {
     fn new<P: Product>(f: &Pair, r: f64) -> Self {
         let (hi, lo) = f.squared_less_pair::<P>(r);
         Self { hi, lo, error: CLOSE_C * (r * r) }
+    }
+
+    /// As [`Excess::new`], and exactly zero if it is that.
+    #[inline(always)]
+    fn or_zero<P: Product>(f: &Pair, r: f64) -> Self {
+        let c = Self::new::<P>(f, r);
+        if c.hi.abs() <= c.error && Self::is_zero::<P>(f, r) { Self::ZERO } else { c }
     }
 
     /// Zero on the sphere: whether it is that, for certain.
