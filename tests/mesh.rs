@@ -49,14 +49,19 @@ fn aimed(mesh: &Mesh, random: &mut Rng) -> (Ray, Interval) {
         _ => target + size * DVec3::AXES[random.index(3)],
     };
     let mut direction = target - origin;
-    match random.index(8) {
+    match random.index(9) {
         0 => direction *= 2f64.powi(random.index(600) as i32 - 300),
+        // Too flat for a slope of their own, of either sign, zeros included.
+        3 => direction[random.index(3)] *= [-0.0, 0.0, -1e-30, 1e-30, -1e-300][random.index(5)],
         1 => direction = direction.normalize_or(DVec3::X),
         2 => direction = DVec3::AXES[random.index(3)],
         _ => {}
     }
-    let within = match random.index(6) {
+    let within = match random.index(8) {
         0 => Interval::LINE,
+        // Next to where the target is.
+        4 => Interval::new(-1e300, 1f64.next_up()),
+        5 => Interval::new([1f64.next_down(), 1.0, 1e-310][random.index(3)], 1e300),
         1 => Interval::new(-1.0, 2.0),
         2 => Interval::new(0.0, 1.0),
         3 => Interval::new(0.5, 1.0 + random.fraction()),

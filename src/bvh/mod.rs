@@ -114,21 +114,37 @@ impl Bvh {
 
     #[inline(always)]
     fn closest_with<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, visit: &mut impl FnMut(u32, f64) -> f64) {
-        let mut bound = within.max;
-        if let Some(local) = LocalRay::new(simd, &self.tree.frame, ray, within) {
-            closest(
-                simd,
-                &self.tree,
-                &Lanes::new(simd, &local),
-                local.t_max,
-                &mut Nearest { bvh: self, local: &local, bound, visit },
-            );
-        } else if !within.is_empty() && ray.is_valid() {
-            // No place in the frame: every object.
-            for &object in &self.objects {
-                bound = visit(object, bound);
-            }
+        match LocalRay::new(simd, &self.tree.frame, ray, within) {
+            Some(local) => self.closest_along(simd, &local, within.max, visit),
+            None => self.closest_from_afar(simd, ray, within, visit),
         }
+    }
+
+    #[inline(never)]
+    fn closest_from_afar<S: Simd>(
+        &self,
+        simd: S,
+        ray: &Ray,
+        within: Interval,
+        visit: &mut impl FnMut(u32, f64) -> f64,
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                if let Some(local) = LocalRay::from_afar(simd, &self.tree.frame, ray, within) {
+                    self.closest_along(simd, &local, within.max, visit);
+                } else if !within.is_empty() && ray.is_valid() {
+                    // No place in the frame: every object.
+                    self.objects.iter().fold(within.max, |bound, &object| visit(object, bound));
+                }
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn closest_along<S: Simd>(&self, simd: S, local: &LocalRay, bound: f64, visit: &mut impl FnMut(u32, f64) -> f64) {
+        let mut nearest = Nearest { bvh: self, local, bound, visit };
+        closest(simd, &self.tree, &Lanes::new(simd, local), local.t_max, &mut nearest);
     }
 
     /// Whether `hits(object)` for any object whose box the ray meets inside `within`; asks until the first yes.
@@ -139,11 +155,26 @@ impl Bvh {
 
     #[inline(always)]
     fn any_with<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, hits: &mut impl FnMut(u32) -> bool) -> bool {
-        if let Some(local) = LocalRay::new(simd, &self.tree.frame, ray, within) {
-            any(simd, &self.tree, &Lanes::new(simd, &local), local.t_max, &mut First { bvh: self, hits })
-        } else {
-            !within.is_empty() && ray.is_valid() && self.objects.iter().any(|&o| hits(o))
+        match LocalRay::new(simd, &self.tree.frame, ray, within) {
+            Some(local) => self.any_along(simd, &local, hits),
+            None => self.any_from_afar(simd, ray, within, hits),
         }
+    }
+
+    #[inline(never)]
+    fn any_from_afar<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, hits: &mut impl FnMut(u32) -> bool) -> bool {
+        simd.vectorize(
+            #[inline(always)]
+            || match LocalRay::from_afar(simd, &self.tree.frame, ray, within) {
+                Some(local) => self.any_along(simd, &local, hits),
+                None => !within.is_empty() && ray.is_valid() && self.objects.iter().any(|&o| hits(o)),
+            },
+        )
+    }
+
+    #[inline(always)]
+    fn any_along<S: Simd>(&self, simd: S, local: &LocalRay, hits: &mut impl FnMut(u32) -> bool) -> bool {
+        any(simd, &self.tree, &Lanes::new(simd, local), local.t_max, &mut First { bvh: self, hits })
     }
 
     /// Uses the instructions of `level` from now on, if this CPU has them: for tests and benchmarks. All levels give

@@ -69,10 +69,10 @@ pub(super) const PLAIN_ERROR: f32 = 8.0 * f64::EPSILON as f32;
 /// Origins beyond this, before or after, are not traced.
 const FARTHEST: f64 = 1_125_899_906_842_624.0; // 2⁵⁰
 
-/// Where a ray starts in the frame, in two vectors of (x, y) and (z, –).
+/// A ray in the frame, rounded.
 struct Placed<S: Simd> {
-    origin: [f64x2<S>; 2],
-    direction: [f64x2<S>; 2],
+    origin: f32x4<S>,
+    direction: f32x4<S>,
     /// See [`LocalRay::origin_error`].
     error: f32,
     /// Slopes 1/direction beyond this are taken for it. A slab is then wider than the ray's stretch near the tree: §10.
@@ -81,39 +81,58 @@ struct Placed<S: Simd> {
 }
 
 impl LocalRay {
-    /// `None` where the ray cannot be expressed in the frame (then every leaf is visited): origins 2⁵⁰ times farther
-    /// than the tree is wide, and directions as extreme; also for rays that are not valid and for empty intervals.
+    /// A ray that is taken as it is, as nearly all are. `None` for others, which are for [`from_afar`](Self::from_afar) in a function of
+    /// its own: what follows is compiled for the constants here.
     #[inline(always)]
     pub(crate) fn new<S: Simd>(simd: S, frame: &Frame, ray: &Ray, within: Interval) -> Option<Self> {
         let pair = |x: f64, y: f64| f64x2::<S>::simd_from(simd, [x, y]);
         let (o, d, c) = (ray.origin, ray.direction, frame.center);
-        let mut placed = Placed {
-            origin: [(pair(o.x, o.y) - pair(c.x, c.y)) * frame.scale, (pair(o.z, 0.0) - pair(c.z, 0.0)) * frame.scale],
-            direction: [pair(d.x, d.y) * frame.scale, pair(d.z, 0.0) * frame.scale],
-            error: PLAIN_ERROR,
-            steepest: STEEPEST,
-            limits: Limits::PLAIN,
-        };
-        let (mut origin, mut direction) = placed.narrowed();
-        let mut length = direction.abs().reduce_max();
+        let direction = (pair(d.x, d.y) * frame.scale).relaxed_narrow(pair(d.z, 0.0) * frame.scale);
+        let origin = ((pair(o.x, o.y) - pair(c.x, c.y)) * frame.scale)
+            .relaxed_narrow((pair(o.z, 0.0) - pair(c.z, 0.0)) * frame.scale);
+        let length = direction.abs().reduce_max();
         let near = origin.abs().simd_le(NEAR) & direction.abs().simd_le(LENGTHS[1]);
         // A NaN fails every comparison.
-        if !((near.to_bitmask() == 0xf) & (length >= LENGTHS[0])) {
-            placed = place(simd, frame, ray)?;
-            (origin, direction) = placed.narrowed();
-            length = direction.abs().reduce_max();
+        if !((near.to_bitmask() == 0xf) & (length >= LENGTHS[0]) & !within.is_empty()) {
+            return None;
         }
+        let placed = Placed { origin, direction, error: PLAIN_ERROR, steepest: STEEPEST, limits: Limits::PLAIN };
+        Some(Self::placed(&placed, length, ray, plain_ends(simd, within)))
+    }
+
+    /// Any other ray. `None` where it cannot be expressed in the frame (then every leaf is visited): origins 2⁵⁰ times farther
+    /// than the tree is wide, and directions as extreme; also for rays that are not valid and for empty intervals.
+    #[inline(always)]
+    pub(crate) fn from_afar<S: Simd>(simd: S, frame: &Frame, ray: &Ray, within: Interval) -> Option<Self> {
         if within.is_empty() {
             return None;
         }
-        let one = f32x4::splat(simd, 1.0);
-        let gentle = direction.abs().simd_lt(1.0 / placed.steepest);
-        let inv = gentle.select(f32x4::splat(simd, placed.steepest), one / direction);
-        let pad = origin.abs().mul_add(f32x4::splat(simd, SLAB), f32x4::splat(simd, SLAB + 2.0 * placed.error));
+        let placed = place(simd, frame, ray)?;
+        let length = placed.direction.abs().reduce_max();
+        let ends = placed.limits.of(simd, within);
+        Some(Self::placed(&placed, length, ray, ends))
+    }
+
+    /// `length`: the largest coordinate of the direction. The ends of the interval as of [`Limits::of`].
+    #[inline(always)]
+    fn placed<S: Simd>(
+        placed: &Placed<S>,
+        length: f32,
+        ray: &Ray,
+        [t_min, sure_max, sure_min, t_max]: [f32; 4],
+    ) -> Self {
+        let &Placed { origin, direction, error, steepest, limits } = placed;
+        let simd = origin.simd;
+        let (one, most) = (f32x4::splat(simd, 1.0), f32x4::splat(simd, steepest));
+        let gentle = direction.abs().simd_lt(1.0 / steepest);
+        let inv = gentle.select(most.copysign(direction), one / direction);
+        let pad = origin.abs().mul_add(f32x4::splat(simd, SLAB), f32x4::splat(simd, SLAB + 2.0 * error));
         let (middle, half) = (origin * inv, inv.abs() * pad);
-        let [t_min, sure_max, sure_min, t_max] = placed.limits.of(simd, within);
-        Some(Self {
-            away: inv.simd_lt(0.0).to_bitmask() as u32,
+        // The sign that `inv` has. Nodes' rows are known by it long before that.
+        let sign = |x: f64| (x.to_bits() >> 63) as u32;
+        let d = ray.direction;
+        Self {
+            away: sign(d.x) | sign(d.y) << 1 | sign(d.z) << 2,
             inv: inv.into(),
             near_shift: (-middle - half).into(),
             far_shift: (half - middle).into(),
@@ -124,9 +143,9 @@ impl LocalRay {
             direction: direction.into(),
             size: origin.abs().reduce_max(),
             length,
-            origin_error: placed.error,
-            limits: placed.limits,
-        })
+            origin_error: error,
+            limits,
+        }
     }
 }
 
@@ -146,7 +165,7 @@ impl Limits {
         ((t + slack) + t.abs() * NARROWING) as f32
     }
 
-    /// The least t of `within.min` and `within.max`, and the greatest of both.
+    /// The least t of `within.min` and of `within.max`, and the greatest of both.
     #[inline(always)]
     fn of<S: Simd>(&self, simd: S, within: Interval) -> [f32; 4] {
         let splat = |x: f64| f64x2::<S>::splat(simd, x);
@@ -157,6 +176,16 @@ impl Limits {
         let half = t.abs() * NARROWING + slack;
         (t - half).relaxed_narrow(t + half).into()
     }
+}
+
+/// [`Limits::of`] for t = λ, in f32: rounded first, then moved by four roundings.
+#[inline(always)]
+fn plain_ends<S: Simd>(simd: S, within: Interval) -> [f32; 4] {
+    let splat = |x: f32| f32x4::<S>::splat(simd, x);
+    let ends = f64x2::<S>::simd_from(simd, [within.min, within.max]);
+    let t = ends.relaxed_narrow(ends).min(splat(FARTHEST_T as f32)).max(splat(-FARTHEST_T as f32));
+    let half = t.abs().mul_add(splat(4.0 * E), splat(TINY as f32));
+    half.mul_add(f32x4::simd_from(simd, [-1.0, -1.0, 1.0, 1.0]), t).into()
 }
 
 /// Beyond this limits are all alike.
@@ -180,15 +209,8 @@ impl Sure {
     }
 }
 
-impl<S: Simd> Placed<S> {
-    #[inline(always)]
-    fn narrowed(&self) -> (f32x4<S>, f32x4<S>) {
-        (self.origin[0].relaxed_narrow(self.origin[1]), self.direction[0].relaxed_narrow(self.direction[1]))
-    }
-}
-
 /// Rays from far outside, and with very long or short directions.
-#[inline(never)]
+#[inline(always)]
 fn place<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<Placed<S>> {
     let e = exponent_of_normal(largest(ray.direction));
     let k = e - frame.exponent;
@@ -208,10 +230,11 @@ fn place<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<Placed<S>> {
     if !((reach <= FARTHEST) & (size <= FARTHEST) & sum.is_finite()) {
         return None;
     }
-    let pair = |x: f64, y: f64| f64x2::<S>::simd_from(simd, [x, y]);
+    let narrow =
+        |v: DVec3| f64x2::<S>::simd_from(simd, [v.x, v.y]).relaxed_narrow(f64x2::<S>::simd_from(simd, [v.z, 0.0]));
     Some(Placed {
-        origin: [pair(origin.x, origin.y), pair(origin.z, 0.0)],
-        direction: [pair(direction.x, direction.y), pair(direction.z, 0.0)],
+        origin: narrow(origin),
+        direction: narrow(direction),
         // u·(|start| + |t·direction| + |origin|) ≤ u·(1 + 2 + 3)·reach, and the underflow of all; up by 2⁻¹⁰.
         error: (4.004 * f64::EPSILON * reach + f64::from(f32::MIN_POSITIVE)) as f32,
         steepest: LENGTHS[1],

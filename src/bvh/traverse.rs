@@ -10,6 +10,7 @@ use fearless_simd::{Simd, f32x8, prelude::*};
 /// What is left to visit, each with the t where its box begins in the highest bits. As signed integers they sort as t does, but for
 /// negative ones among themselves: boxes that the ray starts in come first. Kept in a fixed array; what does not fit,
 /// which no sensible tree needs, goes to the heap.
+#[repr(C, align(32))]
 pub(super) struct Stack<E> {
     entries: [E; ROOM],
     len: usize,
@@ -45,6 +46,12 @@ impl<E: Copy + Default + Ord> Stack<E> {
         self.len += 1;
     }
 
+    #[inline(always)]
+    fn push_if(&mut self, entry: E, really: bool) {
+        self.entries[self.len & (ROOM - 1)] = entry;
+        self.len += usize::from(really);
+    }
+
     /// The last entry.
     #[inline(always)]
     fn top(&mut self) -> &mut E {
@@ -78,6 +85,22 @@ fn in_order(a: i64, b: i64) -> (i64, i64) {
     if a < b { (a, b) } else { (b, a) }
 }
 
+/// A vector in memory. Where it straddles two cache lines its lanes reach their loads late; unaligned it does so in every other process.
+#[repr(align(32))]
+struct Row([f32; 8]);
+
+impl Row {
+    #[inline(always)]
+    fn of<S: Simd>(v: f32x8<S>) -> Self {
+        Self(v.into())
+    }
+
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> f32 {
+        self.0[lane & 7]
+    }
+}
+
 /// A child, and the t where its box begins.
 #[inline(always)]
 fn entry(child: u32, t: f32) -> i64 {
@@ -95,8 +118,9 @@ pub(crate) struct Lanes<S: Simd> {
     near_shift: [f32x8<S>; 3],
     far_shift: [f32x8<S>; 3],
     t_min: f32x8<S>,
-    /// See [`near_rows`].
-    near: [u32; 3],
+    /// Where the rows of the planes met first begin, see [`near_rows`], and of those met last: in floats, so that an address needs no shift.
+    near: [usize; 3],
+    far: [usize; 3],
 }
 
 impl<S: Simd> Lanes<S> {
@@ -107,7 +131,8 @@ impl<S: Simd> Lanes<S> {
             near_shift: spread(simd, &ray.near_shift),
             far_shift: spread(simd, &ray.far_shift),
             t_min: f32x8::splat(simd, ray.t_min),
-            near: near_rows(ray.away),
+            near: near_rows(ray.away).map(|row| 8 * row as usize),
+            far: near_rows(ray.away).map(|row| 8 * (row ^ 1) as usize),
         }
     }
 
@@ -115,9 +140,9 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     fn test(&self, simd: S, node: &WideNode, t_max: f32) -> (u32, f32x8<S>) {
         let [inv, near, far] = [&self.inv, &self.near_shift, &self.far_shift];
-        let (near_x, far_x) = (node.row(simd, self.near[0]), node.row(simd, self.near[0] ^ 1));
-        let (near_y, far_y) = (node.row(simd, self.near[1]), node.row(simd, self.near[1] ^ 1));
-        let (near_z, far_z) = (node.row(simd, self.near[2]), node.row(simd, self.near[2] ^ 1));
+        let (near_x, far_x) = (node.row_from(simd, self.near[0]), node.row_from(simd, self.far[0]));
+        let (near_y, far_y) = (node.row_from(simd, self.near[1]), node.row_from(simd, self.far[1]));
+        let (near_z, far_z) = (node.row_from(simd, self.near[2]), node.row_from(simd, self.far[2]));
         let enter_x = near_x.mul_add(inv[0], near[0]);
         let enter_y = near_y.mul_add(inv[1], near[1]);
         let enter_z = near_z.mul_add(inv[2], near[2]);
@@ -126,9 +151,8 @@ impl<S: Simd> Lanes<S> {
         let exit_z = far_z.mul_add(inv[2], far[2]);
         let enter = enter_x.max(enter_y).max(enter_z.max(self.t_min));
         let exit = exit_x.min(exit_y).min(exit_z.min(f32x8::splat(simd, t_max)));
-        // Certainly a miss only if it enters after it has left.
-        let miss = enter.simd_gt(exit);
-        (!(miss.to_bitmask() as u32) & 0xff, enter)
+        // Certainly a miss only if it enters after it has left; none of the two is NaN (§10).
+        (enter.simd_le(exit).to_bitmask() as u32, enter)
     }
 }
 
@@ -159,8 +183,8 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: 
                 at = NONE;
                 break;
             }
-            let (enter, child): ([f32; 8], [f32; 8]) = (enter.into(), node.row(simd, CHILDREN as u32).into());
-            let child = |lane: usize| child[lane & 7].to_bits();
+            let (enter, child) = (Row::of(enter), Row::of(node.row(simd, CHILDREN as u32)));
+            let child = |lane: usize| child.lane(lane).to_bits();
             let first = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
             if hits == 0 {
@@ -170,7 +194,7 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: 
             stack.reserve();
             let second = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
-            let (a, b) = (entry(child(first), enter[first]), entry(child(second), enter[second]));
+            let (a, b) = (entry(child(first), enter.lane(first)), entry(child(second), enter.lane(second)));
             let (nearer, farther) = in_order(a, b);
             stack.push(farther);
             if hits == 0 {
@@ -180,7 +204,7 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: 
             // Three without branches on their order, which nothing foretells.
             let third = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
-            let c = entry(child(third), enter[third]);
+            let c = entry(child(third), enter.lane(third));
             if hits == 0 {
                 let (c, farther) = in_order(c, farther);
                 let (nearer, c) = in_order(nearer, c);
@@ -195,7 +219,7 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: 
             while hits != 0 {
                 let i = hits.trailing_zeros() as usize & 7;
                 hits &= hits - 1;
-                stack.insert(entry(child(i), enter[i]), count);
+                stack.insert(entry(child(i), enter.lane(i)), count);
                 count += 1;
             }
             let Some(nearest) = stack.pop() else { return };
@@ -224,16 +248,20 @@ pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, t_max: f32, lea
         while at & LEAF == 0 {
             let node = &nodes[at as usize];
             let (mut hits, _) = ray.test(simd, node, t_max);
-            let child: [f32; 8] = node.row(simd, CHILDREN as u32).into();
-            let child = |lane: usize| child[lane & 7].to_bits();
+            let child = Row::of(node.row(simd, CHILDREN as u32));
+            let child = |lane: usize| child.lane(lane).to_bits();
             if hits == 0 {
                 at = NONE;
                 break;
             }
             at = child(hits.trailing_zeros() as usize);
             hits &= hits - 1;
-            if hits != 0 {
-                stack.reserve();
+            stack.reserve();
+            // Two of the others without a branch on whether they are there.
+            for _ in 0..2 {
+                let i = (hits | 1).ilog2();
+                stack.push_if(i64::from(child(i as usize)), hits != 0);
+                hits &= !(1 << i);
             }
             while hits != 0 {
                 let i = hits.ilog2();

@@ -33,6 +33,13 @@ impl WideNode {
         self.rows[row as usize & 7].simd_into(simd)
     }
 
+    /// The row whose first float is number `start`, a multiple of eight.
+    #[inline(always)]
+    pub(crate) fn row_from<S: Simd>(&self, simd: S, start: usize) -> f32x8<S> {
+        let start = start & 0x38;
+        f32x8::from_slice(simd, &self.rows.as_flattened()[start..start + 8])
+    }
+
     #[inline(always)]
     pub(crate) fn child(&self, lane: usize) -> u32 {
         self.rows[CHILDREN][lane & 7].to_bits()

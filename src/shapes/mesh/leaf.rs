@@ -324,8 +324,13 @@ impl Margins {
     #[inline(always)]
     fn new(steps: f32, length: f32) -> Self {
         // |direction| ≤ √3·length, |v₀ − o| ≤ √3·steps
-        let (d, r) = (1.7321 * length, 1.7321 * steps);
-        Self { edge: 13.0 * E * d * r, edge2: 3.1 * E * d, place: E * steps, det: 2.75 * E * d }
+        const ROOT: f32 = 1.7321;
+        Self {
+            edge: (13.0 * E * ROOT * ROOT) * (length * steps),
+            edge2: (3.1 * E * ROOT) * length,
+            place: E * steps,
+            det: (2.75 * E * ROOT) * length,
+        }
     }
 
     #[inline(always)]

@@ -21,13 +21,9 @@ pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
 /// [`closest`] where it is wanted.
 #[inline(always)]
 pub(super) fn find_closest(mesh: &Mesh, ray: &Ray, within: Interval, hit: &mut Option<Hit>) {
-    let asked = Asked::new(ray, within);
+    let mut search = Search { asked: Asked::new(mesh, ray, within), hit };
     dispatch!(mesh.level.token(), simd => {
-        if is_baseline(simd) {
-            closest_apart(simd, mesh, &asked, hit);
-        } else {
-            closest_with(simd, mesh, &asked, hit);
-        }
+        if is_baseline(simd) { closest_apart(simd, &mut search) } else { closest_with(simd, &mut search) }
     });
 }
 
@@ -42,23 +38,30 @@ fn is_baseline<S: Simd>(simd: S) -> bool {
 }
 
 #[inline(never)]
-fn closest_apart<S: Simd>(simd: S, mesh: &Mesh, asked: &Asked, hit: &mut Option<Hit>) {
-    closest_with(simd, mesh, asked, hit);
+fn closest_apart<S: Simd>(simd: S, search: &mut Search) {
+    closest_with(simd, search);
 }
 
-/// A query on its way into a dispatched function, which takes it through memory. The limits do not stand side by side: they
-/// would be stored one by one and loaded as a pair, which has to wait until both have reached the cache.
+/// A query on its way into a dispatched function, which takes it through memory. The limits do not stand side by side: they would be stored
+/// one by one and loaded as a pair, which has to wait until both have reached the cache.
 #[repr(C)]
 struct Asked<'a> {
     min: f64,
     ray: &'a Ray,
     max: f64,
+    mesh: &'a Mesh,
+}
+
+/// With where the answer goes.
+struct Search<'a> {
+    asked: Asked<'a>,
+    hit: &'a mut Option<Hit>,
 }
 
 impl<'a> Asked<'a> {
     #[inline(always)]
-    fn new(ray: &'a Ray, Interval { min, max }: Interval) -> Self {
-        Self { min, ray, max }
+    fn new(mesh: &'a Mesh, ray: &'a Ray, Interval { min, max }: Interval) -> Self {
+        Self { min, ray, max, mesh }
     }
 
     #[inline(always)]
@@ -68,41 +71,77 @@ impl<'a> Asked<'a> {
 }
 
 #[inline(always)]
-fn closest_with<S: Simd>(simd: S, mesh: &Mesh, asked: &Asked, hit: &mut Option<Hit>) {
-    let (ray, within) = (asked.ray, asked.within());
-    let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else {
-        *hit = closest_of_all(mesh, ray, within);
-        return;
-    };
+fn closest_with<S: Simd>(simd: S, search: &mut Search) {
+    let asked = &search.asked;
+    match LocalRay::new(simd, asked.mesh.frame(), asked.ray, asked.within()) {
+        Some(local) => closest_along(simd, search, &local),
+        None => closest_from_afar(simd, search),
+    }
+}
+
+#[inline(never)]
+fn closest_from_afar<S: Simd>(simd: S, search: &mut Search) {
+    simd.vectorize(
+        #[inline(always)]
+        move || {
+            let &Asked { ray, mesh, .. } = &search.asked;
+            let within = search.asked.within();
+            match LocalRay::from_afar(simd, mesh.frame(), ray, within) {
+                Some(local) => closest_along(simd, search, &local),
+                None => *search.hit = closest_of_all(mesh, ray, within),
+            }
+        },
+    );
+}
+
+#[inline(always)]
+fn closest_along<S: Simd>(simd: S, search: &mut Search, local: &LocalRay) {
+    let &Asked { ray, mesh, .. } = &search.asked;
     let mut walk = Single {
-        probe: Probe::new(&local, mesh.exact),
-        nearest: Nearest::new(mesh, ray, within, local.limits, local.sure, local.t_max),
+        probe: Probe::new(local, mesh.exact),
+        nearest: Nearest::new(mesh, ray, search.asked.within(), local.limits, local.sure, local.t_max),
     };
-    bvh::closest(simd, &mesh.tree, &Lanes::new(simd, &local), local.t_max, &mut walk);
-    walk.nearest.settle(simd, hit);
+    bvh::closest(simd, &mesh.tree, &Lanes::new(simd, local), local.t_max, &mut walk);
+    walk.nearest.settle(simd, search.hit);
 }
 
 /// Whether anything is hit.
 pub(super) fn any(mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
-    let asked = Asked::new(ray, within);
+    let asked = Asked::new(mesh, ray, within);
     dispatch!(mesh.level.token(), simd => {
-        if is_baseline(simd) { any_apart(simd, mesh, &asked) } else { any_with(simd, mesh, &asked) }
+        if is_baseline(simd) { any_apart(simd, &asked) } else { any_with(simd, &asked) }
     })
 }
 
 #[inline(never)]
-fn any_apart<S: Simd>(simd: S, mesh: &Mesh, asked: &Asked) -> bool {
-    any_with(simd, mesh, asked)
+fn any_apart<S: Simd>(simd: S, asked: &Asked) -> bool {
+    any_with(simd, asked)
 }
 
 #[inline(always)]
-fn any_with<S: Simd>(simd: S, mesh: &Mesh, asked: &Asked) -> bool {
-    let (ray, within) = (asked.ray, asked.within());
-    let Some(local) = LocalRay::new(simd, mesh.frame(), ray, within) else {
-        return closest_of_all(mesh, ray, within).is_some();
-    };
-    let mut first = First { mesh, ray, within, local: &local, probe: Probe::new(&local, mesh.exact) };
-    bvh::any(simd, &mesh.tree, &Lanes::new(simd, &local), local.t_max, &mut first)
+fn any_with<S: Simd>(simd: S, asked: &Asked) -> bool {
+    match LocalRay::new(simd, asked.mesh.frame(), asked.ray, asked.within()) {
+        Some(local) => any_along(simd, asked, &local),
+        None => any_from_afar(simd, asked),
+    }
+}
+
+#[inline(never)]
+fn any_from_afar<S: Simd>(simd: S, asked: &Asked) -> bool {
+    simd.vectorize(
+        #[inline(always)]
+        move || match LocalRay::from_afar(simd, asked.mesh.frame(), asked.ray, asked.within()) {
+            Some(local) => any_along(simd, asked, &local),
+            None => closest_of_all(asked.mesh, asked.ray, asked.within()).is_some(),
+        },
+    )
+}
+
+#[inline(always)]
+fn any_along<S: Simd>(simd: S, asked: &Asked, local: &LocalRay) -> bool {
+    let &Asked { ray, mesh, .. } = asked;
+    let mut first = First { mesh, ray, within: asked.within(), local, probe: Probe::new(local, mesh.exact) };
+    bvh::any(simd, &mesh.tree, &Lanes::new(simd, local), local.t_max, &mut first)
 }
 
 /// A ray that has no place in the tree's frame.
@@ -195,7 +234,7 @@ impl<'a> Nearest<'a> {
         if self.count == 1 && self.best.is_none() {
             // The rule.
             let Passed { leaf, lane, .. } = self.passed[0];
-            *hit = self.passed(simd, Spot { leaf, lane });
+            self.passed(simd, Spot { leaf, lane }, hit);
             return;
         }
         if self.count > 0 {
@@ -237,12 +276,12 @@ impl<'a> Nearest<'a> {
 
     /// The hit of a triangle that is certainly hit.
     #[inline(always)]
-    fn passed<S: Simd>(&self, simd: S, spot: Spot) -> Option<Hit> {
+    fn passed<S: Simd>(&self, simd: S, spot: Spot, answer: &mut Option<Hit>) {
         let (leaf, lane) = (&self.mesh.leaves[spot.leaf as usize], spot.lane as usize & 7);
         let vertices = leaf.vertices(lane, self.mesh);
         match triangle::passed(simd, self.ray, &vertices, leaf.has_plain_edges(lane)) {
-            Some(hit) if !UNCERTIFIED => Some(Hit { part: leaf.number(lane), ..hit }),
-            _ => self.exactly_apart(simd, spot),
+            Some(hit) if !UNCERTIFIED => *answer = Some(Hit { part: leaf.number(lane), ..hit }),
+            _ => *answer = self.exactly_apart(simd, spot),
         }
     }
 
@@ -251,7 +290,7 @@ impl<'a> Nearest<'a> {
     fn exactly_apart<S: Simd>(&self, simd: S, spot: Spot) -> Option<Hit> {
         simd.vectorize(
             #[inline(always)]
-            || exactly(simd, self.mesh, self.ray, self.within, spot),
+            move || exactly(simd, self.mesh, self.ray, self.within, spot),
         )
     }
 
@@ -259,7 +298,7 @@ impl<'a> Nearest<'a> {
     fn confirm<S: Simd>(&mut self, simd: S, leaf: u32, lane: u32) {
         simd.vectorize(
             #[inline(always)]
-            || {
+            move || {
                 let Some(hit) = exactly(simd, self.mesh, self.ray, self.within, Spot { leaf, lane }) else { return };
                 let best = nearer(self.mesh, self.ray, self.best, hit);
                 self.best = Some(best);
@@ -292,7 +331,7 @@ impl Single<'_> {
     fn visit<S: Simd>(&mut self, simd: S, leaf: u32) {
         simd.vectorize(
             #[inline(always)]
-            || {
+            move || {
                 let triangles = &self.nearest.mesh.leaves[leaf as usize];
                 if let Some(outcome) = self.probe.test(simd, triangles, self.nearest.t_max) {
                     self.candidates(simd, leaf, &outcome);
@@ -334,7 +373,7 @@ impl First<'_> {
     fn visit<S: Simd>(&self, simd: S, leaf: &Leaf) -> bool {
         simd.vectorize(
             #[inline(always)]
-            || match self.probe.test(simd, leaf, self.local.t_max) {
+            move || match self.probe.test(simd, leaf, self.local.t_max) {
                 Some(outcome) => self.candidates(simd, leaf, &outcome),
                 None => false,
             },
@@ -356,6 +395,6 @@ impl First<'_> {
 pub(super) fn occluded<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval, leaf: &Leaf, lane: usize) -> bool {
     simd.vectorize(
         #[inline(always)]
-        || confirm(simd, ray, &leaf.vertices(lane & 7, mesh), within).is_some(),
+        move || confirm(simd, ray, &leaf.vertices(lane & 7, mesh), within).is_some(),
     )
 }
