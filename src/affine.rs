@@ -180,12 +180,10 @@ impl<S: Shape> Affine<S> {
         // Three products, three sums, and products that vanish.
         let slope_error = (normal_error + 5.0 * U) * size + image.direction_error + f64::from_bits(8);
         let least_slope = slope.abs() - slope_error;
-        // Beside the next division, not after it.
-        let steepness = 1.0 / least_slope;
         let shift = -n.dot(e) / slope;
-        let first = (unknown + (normal_error + 4.0 * U) * e_size + shift.abs() * slope_error) * steepness;
+        let first = (unknown + (normal_error + 4.0 * U) * e_size + shift.abs() * slope_error) / least_slope;
         let moved = e_size + unknown + (shift.abs() + first) * size;
-        let bend = 1.3 * (curvature * moved) * moved * steepness;
+        let bend = 1.3 * (curvature * moved) * moved / least_slope;
         let error = (first + bend) * INFLATE;
         let sound = slope.abs() >= 2.0 * slope_error
             && curvature * moved * size <= 0.3 * least_slope
@@ -286,10 +284,10 @@ fn past(hit: &Hit, zone: Interval) -> f64 {
 fn widened(image: &Image, within: Interval) -> Interval {
     let origin = taxicab(image.origin_low) + image.origin_error;
     let direction = taxicab(image.direction_low) + image.direction_error;
-    let scale = REACH / image.ray.direction.abs().max_element();
-    // An infinite limit stays where it is.
+    let longest = image.ray.direction.abs().max_element();
+    // An infinite limit stays where it is, as does one that is infinitely far from all others.
     let reach = |limit: f64| {
-        let by = scale * (origin + limit.abs() * direction);
+        let by = REACH * (origin + limit.abs() * direction) / longest;
         if by.is_finite() { by } else { 0.0 }
     };
     Interval { min: within.min - reach(within.min), max: within.max + reach(within.max) }

@@ -105,6 +105,42 @@ fn counter_examples_stay_right() {
     }
 }
 
+/// λ of a ray whose direction is 2ᵉ as long is 2⁻ᵉ as large, however short that is: how far beside the interval hits are
+/// looked for does not overflow.
+#[test]
+fn the_shortest_directions_lose_nothing() {
+    let mut rng = Rng::new(73);
+    let (mut hits, mut near) = (0, 0);
+    for _ in 0..2_000 {
+        let ball = Affine::new(Sphere::UNIT, stretched(&mut rng)).unwrap();
+        let start = ball.world_from_object().transform_point3(rng.unit());
+        let inward = rng.in_cube(1.0) * 0.3 + ball.world_from_object().translation - start;
+        let long = Ray::new(start, inward);
+        let whole = ball.intersect(&long, Interval::FORWARD);
+        for e in [-900, -1003, -1005, -1010, -1015] {
+            let by = DVec3::splat(2f64.powi(e / 2));
+            let short = Ray::new(start, inward * by * DVec3::splat(2f64.powi(e - e / 2)));
+            let back = short.direction * DVec3::splat(2f64.powi(-(e / 2))) * DVec3::splat(2f64.powi(e / 2 - e));
+            if back != inward {
+                continue;
+            }
+            let hit = ball.intersect(&short, Interval::FORWARD);
+            hits += usize::from(hit.is_some());
+            near += usize::from(whole.is_some_and(|h| h.lambda < 1e-9));
+            let long_again = |x: f64| x * 2f64.powi(e / 2) * 2f64.powi(e - e / 2);
+            let same = match (hit, whole) {
+                (Some(hit), Some(whole)) => {
+                    (long_again(hit.lambda) - whole.lambda).abs() <= long_again(hit.error) + whole.error
+                }
+                (a, b) => a.is_none() && b.is_none(),
+            };
+            assert!(same, "2^{e}: {hit:?}, {whole:?}: {short:?} {ball:?}");
+        }
+    }
+    println!("{hits} hits of short directions, {near} next to their origin");
+    assert!(hits > 2_000 && near > 200);
+}
+
 /// Counts what is asked of it.
 #[derive(Debug, Default)]
 struct Counted {

@@ -8,6 +8,7 @@ use crate::kernel::bound::{TRIANGLE_CONDITION, TRIANGLE_LAMBDA, TRIANGLE_SIDES, 
 use crate::kernel::cpu;
 use crate::kernel::eft::{Fused, Product, Split, two_diff, two_sum};
 use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
+
 /// Of eight vectors the x, the y and the z.
 pub type Vectors<S> = [f64x8<S>; 3];
 
