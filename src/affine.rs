@@ -285,11 +285,8 @@ fn widened(image: &Image, within: Interval) -> Interval {
     let origin = taxicab(image.origin_low) + image.origin_error;
     let direction = taxicab(image.direction_low) + image.direction_error;
     let longest = image.ray.direction.abs().max_element();
-    // An infinite limit stays where it is, as does one that is infinitely far from all others.
-    let reach = |limit: f64| {
-        let by = REACH * (origin + limit.abs() * direction) / longest;
-        if by.is_finite() { by } else { 0.0 }
-    };
+    // Infinite limits stay where they are; where the way to a finite one overflows, nothing is left out. 0·∞ adds nothing.
+    let reach = |limit: f64| (REACH * (origin + limit.abs() * direction) / longest).max(0.0);
     Interval { min: within.min - reach(within.min), max: within.max + reach(within.max) }
 }
 

@@ -166,6 +166,22 @@ fn tile(mesh: &Mesh, random: &mut Rng) -> Vec<(Ray, Interval)> {
         .collect()
 }
 
+/// Asserts that a slice is answered as its rays are one by one, nearest and any hit, with every instruction set; how many hit.
+fn answered_alike(mesh: &mut Mesh, rays: &[(Ray, Interval)]) -> usize {
+    let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
+    for (level, simd) in Level::all() {
+        mesh.set_level(simd);
+        mesh.intersect_each(rays, &mut hits);
+        mesh.occludes_each(rays, &mut occluded);
+        for (i, (ray, within)) in rays.iter().enumerate() {
+            let alone = mesh.intersect(ray, *within);
+            assert_eq!(hits[i], alone, "{level}: ray {i}, {ray:?} {within:?}");
+            assert_eq!(occluded[i], alone.is_some(), "{level}: ray {i}, {ray:?} {within:?}");
+        }
+    }
+    hits.iter().flatten().count()
+}
+
 #[test]
 fn slices_are_answered_as_their_rays_are() {
     let mut random = Rng::new(21);
@@ -176,19 +192,8 @@ fn slices_are_answered_as_their_rays_are() {
         let mut mesh = Mesh::new(positions, triangles).unwrap();
         for _ in 0..400 {
             let rays = tile(&mesh, &mut random);
-            let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
-            for (level, simd) in Level::all() {
-                mesh.set_level(simd);
-                mesh.intersect_each(&rays, &mut hits);
-                mesh.occludes_each(&rays, &mut occluded);
-                for (i, (ray, within)) in rays.iter().enumerate() {
-                    let alone = mesh.intersect(ray, *within);
-                    assert_eq!(hits[i], alone, "{level}: ray {i}, {ray:?} {within:?}");
-                    assert_eq!(occluded[i], alone.is_some(), "{level}: ray {i}, {ray:?} {within:?}");
-                }
-            }
             rays_in_all += rays.len();
-            hits_in_all += hits.iter().flatten().count();
+            hits_in_all += answered_alike(&mut mesh, &rays);
         }
     }
     println!("{rays_in_all} rays in slices, {hits_in_all} hits, {} levels, 0 differences", Level::all().len());
@@ -223,19 +228,8 @@ fn slices_from_a_surface_are_answered_as_their_rays_are() {
                     }
                 })
                 .collect();
-            let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
-            for (level, simd) in Level::all() {
-                mesh.set_level(simd);
-                mesh.intersect_each(&rays, &mut hits);
-                mesh.occludes_each(&rays, &mut occluded);
-                for (i, (ray, within)) in rays.iter().enumerate() {
-                    let alone = mesh.intersect(ray, *within);
-                    assert_eq!(hits[i], alone, "{level}: ray {i}, {ray:?} {within:?}");
-                    assert_eq!(occluded[i], alone.is_some(), "{level}: ray {i}, {ray:?} {within:?}");
-                }
-            }
             rays_in_all += rays.len();
-            hits_in_all += hits.iter().flatten().count();
+            hits_in_all += answered_alike(&mut mesh, &rays);
         }
     }
     println!("{rays_in_all} rays at one place of a surface, {hits_in_all} hits, 0 differences");
@@ -265,17 +259,8 @@ fn slices_to_a_light_in_the_middle_are_answered_as_their_rays_are() {
                     (Ray::new(from, light - from), Interval::new(1e-9, 1.0))
                 })
                 .collect();
-            let mut occluded = vec![false; rays.len()];
-            for (level, simd) in Level::all() {
-                mesh.set_level(simd);
-                mesh.occludes_each(&rays, &mut occluded);
-                for (i, (ray, within)) in rays.iter().enumerate() {
-                    let alone = mesh.occludes(ray, *within);
-                    assert_eq!(occluded[i], alone, "{level}: ray {i}, {ray:?} {within:?}");
-                }
-            }
             rays_in_all += rays.len();
-            hits_in_all += occluded.iter().filter(|&&met| met).count();
+            hits_in_all += answered_alike(&mut mesh, &rays);
         }
     }
     println!("{rays_in_all} rays to a light, {hits_in_all} hits, 0 differences");
