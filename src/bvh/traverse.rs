@@ -11,23 +11,23 @@ use fearless_simd::{Simd, f32x8, prelude::*};
 /// negative ones among themselves: boxes that the ray starts in come first. Kept in a fixed array; what does not fit,
 /// which no sensible tree needs, goes to the heap.
 #[repr(C, align(32))]
-pub(super) struct Stack<E> {
-    entries: [E; ROOM],
+struct Stack {
+    entries: [i64; ROOM],
     len: usize,
-    spilled: Vec<E>,
+    spilled: Vec<i64>,
 }
 
 const ROOM: usize = 32;
 
-impl<E: Copy + Default + Ord> Stack<E> {
+impl Stack {
     #[inline(always)]
-    pub(super) fn new() -> Self {
-        Self { entries: [E::default(); ROOM], len: 0, spilled: Vec::new() }
+    fn new() -> Self {
+        Self { entries: [0; ROOM], len: 0, spilled: Vec::new() }
     }
 
     /// Room for eight more.
     #[inline(always)]
-    pub(super) fn reserve(&mut self) {
+    fn reserve(&mut self) {
         if self.len > ROOM - 8 {
             self.spill();
         }
@@ -41,26 +41,26 @@ impl<E: Copy + Default + Ord> Stack<E> {
     }
 
     #[inline(always)]
-    fn push(&mut self, entry: E) {
+    fn push(&mut self, entry: i64) {
         self.entries[self.len & (ROOM - 1)] = entry;
         self.len += 1;
     }
 
     #[inline(always)]
-    fn push_if(&mut self, entry: E, really: bool) {
+    fn push_if(&mut self, entry: i64, really: bool) {
         self.entries[self.len & (ROOM - 1)] = entry;
         self.len += usize::from(really);
     }
 
     /// The last entry.
     #[inline(always)]
-    fn top(&mut self) -> &mut E {
+    fn top(&mut self) -> &mut i64 {
         &mut self.entries[(self.len - 1) & (ROOM - 1)]
     }
 
     /// Pushes below all of the last `count` that are nearer.
     #[inline(always)]
-    pub(super) fn insert(&mut self, entry: E, count: usize) {
+    fn insert(&mut self, entry: i64, count: usize) {
         let mut at = self.len;
         while at > self.len - count && self.entries[(at - 1) & (ROOM - 1)] < entry {
             self.entries[at & (ROOM - 1)] = self.entries[(at - 1) & (ROOM - 1)];
@@ -71,7 +71,7 @@ impl<E: Copy + Default + Ord> Stack<E> {
     }
 
     #[inline(always)]
-    pub(super) fn pop(&mut self) -> Option<E> {
+    fn pop(&mut self) -> Option<i64> {
         if self.len == 0 {
             return self.spilled.pop();
         }
@@ -172,7 +172,7 @@ pub(crate) trait Any<S: Simd> {
 #[inline(always)]
 pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: f32, leaves: &mut impl Closest<S>) {
     let nodes = &tree.nodes[..];
-    let mut stack = Stack::<i64>::new();
+    let mut stack = Stack::new();
     let mut at = 0u32;
     loop {
         // Down to a leaf, or to nothing.
@@ -242,7 +242,7 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: 
 #[inline(always)]
 pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, t_max: f32, leaves: &mut impl Any<S>) -> bool {
     let nodes = &tree.nodes[..];
-    let mut stack = Stack::<i64>::new();
+    let mut stack = Stack::new();
     let mut at = 0u32;
     loop {
         while at & LEAF == 0 {

@@ -200,8 +200,7 @@ pub(super) fn exactly<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval
 /// A triangle that is certainly hit, at this t or later.
 #[derive(Clone, Copy)]
 struct Passed {
-    leaf: u32,
-    lane: u32,
+    spot: Spot,
     t: f32,
 }
 
@@ -224,7 +223,7 @@ struct Nearest<'a> {
 impl<'a> Nearest<'a> {
     #[inline(always)]
     fn new(mesh: &'a Mesh, ray: &'a Ray, within: Interval, limits: Limits, sure: Sure, t_max: f32) -> Self {
-        let passed = [Passed { leaf: 0, lane: 0, t: 0.0 }; MOST_PASSED];
+        let passed = [Passed { spot: Spot { leaf: 0, lane: 0 }, t: 0.0 }; MOST_PASSED];
         Self { mesh, ray, within, limits, sure, t_max, passed, count: 0, best: None }
     }
 
@@ -233,8 +232,7 @@ impl<'a> Nearest<'a> {
     fn settle<S: Simd>(&mut self, simd: S, hit: &mut Option<Hit>) {
         if self.count == 1 && self.best.is_none() {
             // The rule.
-            let Passed { leaf, lane, .. } = self.passed[0];
-            self.passed(simd, Spot { leaf, lane }, hit);
+            self.passed(simd, self.passed[0].spot, hit);
             return;
         }
         if self.count > 0 {
@@ -245,13 +243,13 @@ impl<'a> Nearest<'a> {
 
     /// Considers a triangle that may be met between the t of `depth`; `through`: whose inside the line certainly passes.
     #[inline(always)]
-    fn consider<S: Simd>(&mut self, simd: S, [leaf, lane]: [u32; 2], through: bool, [low, high]: [f32; 2]) {
+    fn consider<S: Simd>(&mut self, simd: S, spot: Spot, through: bool, [low, high]: [f32; 2]) {
         // Elsewhere the sign of the denominator is not known, and the depths mean nothing.
         if through && low > self.t_max {
             return;
         }
         if !(through && self.sure.holds([low, high])) {
-            return self.confirm(simd, leaf, lane);
+            return self.confirm(simd, spot);
         }
         if high < self.t_max {
             self.t_max = high;
@@ -259,7 +257,7 @@ impl<'a> Nearest<'a> {
         if self.count == MOST_PASSED {
             self.decide(simd);
         }
-        self.passed[self.count % MOST_PASSED] = Passed { leaf, lane, t: low };
+        self.passed[self.count % MOST_PASSED] = Passed { spot, t: low };
         self.count += 1;
     }
 
@@ -267,9 +265,9 @@ impl<'a> Nearest<'a> {
     #[inline(never)]
     fn decide<S: Simd>(&mut self, simd: S) {
         for i in 0..std::mem::take(&mut self.count) {
-            let Passed { leaf, lane, t } = self.passed[i % MOST_PASSED];
+            let Passed { spot, t } = self.passed[i % MOST_PASSED];
             if t <= self.t_max {
-                self.confirm(simd, leaf, lane);
+                self.confirm(simd, spot);
             }
         }
     }
@@ -277,7 +275,7 @@ impl<'a> Nearest<'a> {
     /// The hit of a triangle that is certainly hit.
     #[inline(always)]
     fn passed<S: Simd>(&self, simd: S, spot: Spot, answer: &mut Option<Hit>) {
-        let (leaf, lane) = (&self.mesh.leaves[spot.leaf as usize], spot.lane as usize & 7);
+        let (leaf, lane) = spot.at(self.mesh);
         let vertices = leaf.vertices(lane, self.mesh);
         match triangle::passed(simd, self.ray, &vertices, leaf.has_plain_edges(lane)) {
             Some(hit) if !UNCERTIFIED => *answer = Some(Hit { part: leaf.number(lane), ..hit }),
@@ -295,11 +293,11 @@ impl<'a> Nearest<'a> {
     }
 
     #[inline(never)]
-    fn confirm<S: Simd>(&mut self, simd: S, leaf: u32, lane: u32) {
+    fn confirm<S: Simd>(&mut self, simd: S, spot: Spot) {
         simd.vectorize(
             #[inline(always)]
             move || {
-                let Some(hit) = exactly(simd, self.mesh, self.ray, self.within, Spot { leaf, lane }) else { return };
+                let Some(hit) = exactly(simd, self.mesh, self.ray, self.within, spot) else { return };
                 let best = nearer(self.mesh, self.ray, self.best, hit);
                 self.best = Some(best);
                 let t = self.limits.upper(best.lambda + best.error);
@@ -347,7 +345,7 @@ impl Single<'_> {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
             let through = outcome.through >> lane & 1 == 1;
-            self.nearest.consider(simd, [leaf, lane], through, outcome.depths.interval(lane as usize));
+            self.nearest.consider(simd, Spot { leaf, lane }, through, outcome.depths.interval(lane as usize));
         }
     }
 }
