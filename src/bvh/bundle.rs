@@ -4,11 +4,12 @@
 //! box that is next in turn with all rays, sixteen a vector: docs/numerics.md §10.
 
 use super::frame::Frame;
-use super::slab::{E, LENGTHS, NEAR, PLAIN_ERROR, SLAB, STEEPEST};
+use super::slab::{E, FARTHEST_T, LENGTHS, NEAR, PLAIN_ERROR, SLAB, STEEPEST, TINY};
 use super::waiting::{Waiting, in_order, lane_of, t_of};
 use super::wide::{LEAF, Wide, WideNode, near_rows};
+use crate::kernel::rows::{columns, row};
 use crate::{Interval, Ray};
-use fearless_simd::{Simd, f32x8, f32x16, f64x8, mask32x8, prelude::*};
+use fearless_simd::{Simd, f32x8, f32x16, f64x8, mask32x8, mask32x16, prelude::*};
 
 /// How many rays a bundle has.
 pub(crate) const RAYS: usize = 32;
@@ -42,12 +43,6 @@ const FARTHEST_END: f32 = 8.0;
 /// As [`PLAIN_ERROR`], of the end of a ray: 48u are needed.
 const BACK_ERROR: f32 = 4.0 * PLAIN_ERROR;
 
-/// Beyond this limits of t are all alike: 2¹⁰⁰.
-const FARTHEST_T: f32 = 1_125_899_906_842_624.0 * 1_125_899_906_842_624.0;
-
-/// Slack of a limit at or near zero: 2⁻⁶⁰, as [`Limits`](super::Limits) has it.
-const TINY: f32 = 1.0 / (1u64 << 60) as f32;
-
 /// From which end the rays of a bundle are looked at.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Start {
@@ -70,21 +65,8 @@ pub(crate) struct Sixteen {
     /// −∞ for a ray that has its answer.
     pub(crate) t_max: [f32; 16],
     /// What lies between these is certainly inside the ray's interval.
-    pub(crate) sure_min: [f32; 16],
-    pub(crate) sure_max: [f32; 16],
-}
-
-/// Eight numbers each of sixteen rays, two rays a vector: the numbers by ray.
-#[inline(always)]
-fn columns<S: Simd>(rows: [f32x16<S>; 8]) -> [f32x16<S>; 8] {
-    let [a, b, c, d, e, f, g, h] = rows;
-    // Every other number: the even ones and the odd, of four rays each; then every fourth, of eight; every eighth.
-    let ((a, i), (c, j), (e, k), (g, l)) = (a.deinterleave(b), c.deinterleave(d), e.deinterleave(f), g.deinterleave(h));
-    let ((a, c), (e, g)) = (a.deinterleave(c), e.deinterleave(g));
-    let ((i, j), (k, l)) = (i.deinterleave(j), k.deinterleave(l));
-    let ((x0, x4), (x2, x6)) = (a.deinterleave(e), c.deinterleave(g));
-    let ((x1, x5), (x3, x7)) = (i.deinterleave(k), j.deinterleave(l));
-    [x0, x1, x2, x3, x4, x5, x6, x7]
+    sure_min: [f32; 16],
+    sure_max: [f32; 16],
 }
 
 /// What a bundle's bounds are made of: numbers of two rays a vector, as they lie in memory.
@@ -150,24 +132,25 @@ impl Sixteen {
         let to_frame = f64x8::simd_from(simd, [s, s, s, s, s, s, 1.0, 1.0]);
         let back = f64x8::simd_from(simd, [s, s, s, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let mut rows = [f32x16::splat(simd, 0.0); 8];
-        for (i, row) in rows.iter_mut().enumerate() {
+        for (i, two) in rows.iter_mut().enumerate() {
             let mut both = [f64x8::splat(simd, 0.0); 2];
             for k in 0..2 {
-                let (Ray { origin: o, direction: d }, Interval { min, max }) = rays[2 * i + k];
-                both[k] = (f64x8::simd_from(simd, [o.x, o.y, o.z, d.x, d.y, d.z, min, max]) - center) * to_frame;
+                let ray = &rays[2 * i + k];
+                both[k] = (row(simd, ray) - center) * to_frame;
                 if from == Start::End {
+                    let (Ray { direction: d, .. }, Interval { max, .. }) = *ray;
                     both[k] += f64x8::simd_from(simd, [d.x, d.y, d.z, 0.0, 0.0, 0.0, 0.0, 0.0]) * (back * max);
                 }
             }
-            *row = both[0].relaxed_narrow(both[1]);
-            extent.add(*row);
+            *two = both[0].relaxed_narrow(both[1]);
+            extent.add(*two);
         }
         let [ox, oy, oz, dx, dy, dz, min, max] = columns(rows);
         // A NaN is below nothing.
         let long = min.simd_lt(max).to_bitmask() == 0xffff;
-        let farthest = f32x16::splat(simd, FARTHEST_T);
+        let farthest = f32x16::splat(simd, FARTHEST_T as f32);
         let (min, max) = (min.min(farthest).max(-farthest), max.min(farthest).max(-farthest));
-        let (rounding, tiny) = (f32x16::splat(simd, 4.0 * E), f32x16::splat(simd, TINY));
+        let (rounding, tiny) = (f32x16::splat(simd, 4.0 * E), f32x16::splat(simd, TINY as f32));
         let slack = [min.abs().mul_add(rounding, tiny), max.abs().mul_add(rounding, tiny)];
         let (o, mut d) = ([ox, oy, oz], [dx, dy, dz]);
         let (mut ends, mut slacks, mut error) = ([min, max], slack, PLAIN_ERROR);
@@ -190,6 +173,19 @@ impl Sixteen {
         (self.sure_min, self.sure_max) = ((ends[0] + slacks[0]).into(), (ends[1] - slacks[1]).into());
         let length = d[0].abs().max(d[1].abs()).max(d[2].abs());
         ([length, length * max.abs()], long)
+    }
+
+    /// Whether a t between these is inside the ray's interval for certain.
+    #[inline(always)]
+    pub(crate) fn holds(&self, lane: usize, [low, high]: [f32; 2]) -> bool {
+        (low > self.sure_min[lane & 15]) & (high < self.sure_max[lane & 15])
+    }
+
+    /// The same of all rays, each with its own.
+    #[inline(always)]
+    pub(crate) fn all_hold<S: Simd>(&self, simd: S, [low, high]: [f32x16<S>; 2]) -> mask32x16<S> {
+        let (min, max): (f32x16<S>, f32x16<S>) = (self.sure_min.simd_into(simd), self.sure_max.simd_into(simd));
+        low.simd_gt(min) & high.simd_lt(max)
     }
 
     #[inline(always)]

@@ -52,7 +52,7 @@ pub(super) const SLAB: f32 = 8.0 * E;
 
 /// Slack of a limit at or near zero. Nothing in a tree of width 1 is that small, and products with it stay clear of the
 /// subnormals, whose arithmetic costs a hundred times as much.
-const TINY: f64 = 1.0 / (1u64 << 60) as f64;
+pub(super) const TINY: f64 = 1.0 / (1u64 << 60) as f64;
 
 /// Origins further out than this are first moved along the ray to the tree.
 pub(super) const NEAR: f32 = 4.0;
@@ -189,7 +189,7 @@ fn plain_ends<S: Simd>(simd: S, within: Interval) -> [f32; 4] {
 }
 
 /// Beyond this limits are all alike.
-const FARTHEST_T: f64 = power(100);
+pub(super) const FARTHEST_T: f64 = power(100);
 
 /// Covers the rounding of a limit to f32, twice.
 const NARROWING: f64 = power(-23);

@@ -15,6 +15,7 @@ mod pair;
 pub mod plane;
 pub mod polygon;
 pub mod ratio;
+pub(crate) mod rows;
 pub mod scaled;
 #[cfg(test)]
 pub(crate) mod search;

@@ -8,7 +8,7 @@ use super::seen::{OfSixteen, Seen, View, everywhere};
 use super::settle::{Remembered, settle};
 use crate::bvh::{self, Bundle, Limits, RAYS, SIXTEENS, Start};
 use crate::{Hit, Interval, Ray};
-use fearless_simd::{Simd, dispatch, f32x8, f32x16, mask32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, dispatch, f32x8, f32x16, prelude::*, u32x16};
 use glam::DVec3;
 
 /// A ray and the stretch of it that counts.
@@ -76,8 +76,13 @@ fn each<T: Copy + Default>(
     }
 }
 
-/// Fewer rays than this are no bundle.
+/// Fewer rays than this are no bundle; [`end_together`] looks at six.
 const FEWEST: usize = 8;
+
+/// Rays turned by more than this against each other, and ends farther apart, in lengths of the ray, are not tried as a bundle: of
+/// the way that answers are found, not of the answers.
+const TURNED: f64 = 0.5;
+const APART: f64 = 1e-5;
 
 /// A first look that costs next to nothing: whether a few directions are alike. [`Bundle::take`] looks at all.
 fn go_together(rays: &[Stretch]) -> bool {
@@ -95,11 +100,11 @@ fn end_together(rays: &[Stretch]) -> bool {
         let i = i * rays.len() / 5;
         is_near(rays[i].0.direction, rays[i + 1].0.direction)
     };
-    (first - last).abs().max_element() <= way * 1e-5 && (1..5).filter(neighbours).count() >= 3
+    (first - last).abs().max_element() <= way * APART && (1..5).filter(neighbours).count() >= 3
 }
 
 fn is_near(a: DVec3, b: DVec3) -> bool {
-    (b - a).abs().max_element() <= 0.5 * a.abs().max_element()
+    (b - a).abs().max_element() <= TURNED * a.abs().max_element()
 }
 
 /// A bundle's walk, with what all its rays have in common.
@@ -231,13 +236,6 @@ impl<S: Simd, A: Answers<S>> bvh::Together<S> for Walk<'_, A> {
     }
 }
 
-/// The lanes whose triangles are met inside their rays' intervals, for certain.
-#[inline(always)]
-fn certain<S: Simd>(simd: S, rays: &bvh::Sixteen, verdict: &OfSixteen<S>) -> mask32x16<S> {
-    let (min, max): (f32x16<S>, f32x16<S>) = (rays.sure_min.simd_into(simd), rays.sure_max.simd_into(simd));
-    verdict.through & verdict.low.simd_gt(min) & verdict.high.simd_lt(max)
-}
-
 /// `false`, and nothing done, if the rays are no bundle.
 #[inline(always)]
 fn closest_with<S: Simd>(
@@ -290,10 +288,10 @@ impl<S: Simd> Answers<S> for Nearests<'_> {
     fn of_sixteen(walk: &mut Walk<Self>, simd: S, spot: Spot, sixteen: usize, verdict: &OfSixteen<S>) -> u32 {
         let rays = &mut walk.bundle.rays[sixteen];
         let [low, t_max]: [f32x16<S>; 2] = [walk.answers.low[sixteen].simd_into(simd), rays.t_max.simd_into(simd)];
-        let nearer = certain(simd, rays, verdict) & verdict.high.simd_lt(low);
+        let certain = verdict.through & rays.all_hold(simd, [verdict.low, verdict.high]);
+        let nearer = certain & verdict.high.simd_lt(low);
         let farther = verdict.through & verdict.low.simd_gt(t_max);
-        let id = walk.mesh.leaves[spot.leaf as usize].id[spot.lane as usize & 7];
-        let ids = nearer.select(u32x16::splat(simd, id), walk.answers.id[sixteen].simd_into(simd));
+        let ids = nearer.select(u32x16::splat(simd, spot.id(walk.mesh)), walk.answers.id[sixteen].simd_into(simd));
         walk.answers.id[sixteen] = ids.into();
         let spots = nearer.select(u32x16::splat(simd, spot.packed()), walk.answers.spot[sixteen].simd_into(simd));
         walk.answers.spot[sixteen] = spots.into();
@@ -312,19 +310,20 @@ impl<S: Simd> Answers<S> for Nearests<'_> {
     #[inline(always)]
     fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, [low, high]: [f32; 2]) -> bool {
         let (rays, lane) = (&mut walk.bundle.rays[ray / 16], ray % 16);
+        let sure = rays.holds(lane, [low, high]);
         let t_max = &mut rays.t_max[lane];
         if through && low > *t_max {
             return false;
         }
         let of_ray = &mut walk.answers.low[ray / 16][lane];
-        if !(through & (low > rays.sure_min[lane]) & (high < rays.sure_max[lane]) & (high < *of_ray)) {
+        if !(through & sure & (high < *of_ray)) {
             walk.confirm(simd, spot, ray);
             return false;
         }
         *of_ray = low;
         walk.answers.remembered |= 1 << ray;
         walk.answers.spot[ray / 16][lane] = spot.packed();
-        walk.answers.id[ray / 16][lane] = walk.mesh.leaves[spot.leaf as usize].id[spot.lane as usize & 7];
+        walk.answers.id[ray / 16][lane] = spot.id(walk.mesh);
         if high < *t_max {
             *t_max = high;
         }
@@ -406,8 +405,9 @@ struct Until<'a> {
 impl<S: Simd> Answers<S> for Until<'_> {
     #[inline(always)]
     fn of_sixteen(walk: &mut Walk<Self>, simd: S, spot: Spot, sixteen: usize, verdict: &OfSixteen<S>) -> u32 {
-        let certain = certain(simd, &walk.bundle.rays[sixteen], verdict).to_bitmask() as u32;
-        let maybe = verdict.maybe;
+        let rays = &walk.bundle.rays[sixteen];
+        let certain = verdict.through & rays.all_hold(simd, [verdict.low, verdict.high]);
+        let (certain, maybe) = (certain.to_bitmask() as u32, verdict.maybe);
         let (mut met, mut open) = (maybe & certain, maybe & !certain);
         while open != 0 {
             let lane = open.trailing_zeros() as usize;
@@ -426,9 +426,8 @@ impl<S: Simd> Answers<S> for Until<'_> {
     }
 
     #[inline(always)]
-    fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, [low, high]: [f32; 2]) -> bool {
-        let (rays, lane) = (&walk.bundle.rays[ray / 16], ray % 16);
-        let met = through & (low > rays.sure_min[lane]) & (high < rays.sure_max[lane]) || walk.meets(simd, spot, ray);
+    fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, depth: [f32; 2]) -> bool {
+        let met = through & walk.bundle.rays[ray / 16].holds(ray % 16, depth) || walk.meets(simd, spot, ray);
         if met {
             walk.end(ray);
         }
@@ -440,7 +439,8 @@ impl Walk<'_, Until<'_>> {
     #[inline(always)]
     fn meets<S: Simd>(&self, simd: S, spot: Spot, ray: usize) -> bool {
         let (ref asked, within) = self.rays[ray % RAYS];
-        occluded(simd, self.mesh, asked, within, &self.mesh.leaves[spot.leaf as usize], spot.lane as usize)
+        let (leaf, lane) = spot.at(self.mesh);
+        occluded(simd, self.mesh, asked, within, leaf, lane)
     }
 
     /// The ray has its answer.

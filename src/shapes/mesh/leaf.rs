@@ -84,14 +84,22 @@ impl Spot {
         (&mesh.leaves[self.leaf as usize], self.lane as usize & 7)
     }
 
+    /// What the leaf has for its `id`.
+    #[inline(always)]
+    pub(super) fn id(self, mesh: &Mesh) -> u32 {
+        let (leaf, lane) = self.at(mesh);
+        leaf.id[lane]
+    }
+
     #[inline(always)]
     pub(super) fn number(self, mesh: &Mesh) -> u32 {
-        mesh.leaves[self.leaf as usize].number(self.lane as usize & 7)
+        number(self.id(mesh))
     }
 
     #[inline(always)]
     pub(super) fn vertices(self, mesh: &Mesh) -> [DVec3; 3] {
-        mesh.leaves[self.leaf as usize].vertices(self.lane as usize & 7, mesh)
+        let (leaf, lane) = self.at(mesh);
+        leaf.vertices(lane, mesh)
     }
 }
 

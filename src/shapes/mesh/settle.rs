@@ -4,8 +4,9 @@ use super::Mesh;
 use super::each::Stretch;
 use super::leaf::{ROTATION, Spot, UNCERTIFIED, number};
 use super::query::exactly;
+use crate::Hit;
+use crate::kernel::rows;
 use crate::kernel::triangle::eight;
-use crate::{Hit, Interval, Ray};
 use fearless_simd::{Simd, f32x8, f64x4, f64x8, prelude::*};
 use glam::{DVec2, DVec3};
 
@@ -53,18 +54,6 @@ pub(super) fn settle<S: Simd>(
 
 /// Fewer are answered one by one.
 const FEWEST: u32 = 2;
-
-/// Of eight rows of eight the columns.
-#[inline(always)]
-fn columns<S: Simd>(rows: [f64x8<S>; 8]) -> [f64x8<S>; 8] {
-    let [a, b, c, d, e, f, g, h] = rows;
-    // Every other number of two rows, then every fourth of four, then every eighth.
-    let ((a, e), (b, f), (c, g), (d, h)) = (a.deinterleave(b), c.deinterleave(d), e.deinterleave(f), g.deinterleave(h));
-    let ((a, c), (b, d), (e, g), (f, h)) = (a.deinterleave(b), c.deinterleave(d), e.deinterleave(f), g.deinterleave(h));
-    let ((x0, x4), (x2, x6)) = (a.deinterleave(b), c.deinterleave(d));
-    let ((x1, x5), (x3, x7)) = (e.deinterleave(f), g.deinterleave(h));
-    [x0, x1, x2, x3, x4, x5, x6, x7]
-}
 
 /// x, y and z of eight vectors.
 #[inline(always)]
@@ -130,12 +119,6 @@ fn widened<S: Simd>(simd: S, x: [f32; 8]) -> f64x8<S> {
     x.combine(x).widen().0
 }
 
-/// All that a ray is.
-#[inline(always)]
-fn row<S: Simd>(simd: S, (Ray { origin: o, direction: d }, Interval { min, max }): &Stretch) -> f64x8<S> {
-    f64x8::simd_from(simd, [o.x, o.y, o.z, d.x, d.y, d.z, *min, *max])
-}
-
 #[inline(always)]
 fn settle_eight<S: Simd>(
     simd: S,
@@ -145,11 +128,11 @@ fn settle_eight<S: Simd>(
     Remembered { spots, ids, .. }: Remembered,
     hits: &mut [Option<Hit>],
 ) {
-    let mut rows = [f64x8::splat(simd, 0.0); 8];
-    for (row, &ray) in rows.iter_mut().zip(&of) {
-        *row = self::row(simd, &rays[ray]);
+    let mut of_rays = [f64x8::splat(simd, 0.0); 8];
+    for (row, &ray) in of_rays.iter_mut().zip(&of) {
+        *row = rows::row(simd, &rays[ray]);
     }
-    let [ox, oy, oz, dx, dy, dz, min, max] = columns(rows);
+    let [ox, oy, oz, dx, dy, dz, min, max] = rows::columns(of_rays);
     let (mut spot, mut id) = ([Spot::of(0); 8], [0; 8]);
     for (i, &ray) in of.iter().enumerate() {
         (spot[i], id[i]) = (Spot::of(spots[ray]), ids[ray]);
