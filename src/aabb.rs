@@ -30,7 +30,7 @@ impl Aabb {
     }
 
     /// A box around the images of `points` under `map`: little larger than rounding makes necessary, the entries of the
-    /// map taken to be rounded too.
+    /// map taken to be rounded too; everything, if one of them overflows.
     #[must_use]
     pub fn around_images(points: &[DVec3], map: &DAffine3) -> Self {
         let (m, t) = (map.matrix3, map.translation);
@@ -39,7 +39,8 @@ impl Aabb {
             // One rounding of the entry, one of the product, three of the sum; the rest is for this line.
             let off = size * (4.0 * f64::EPSILON) + DVec3::splat(f64::MIN_POSITIVE);
             let image = m * *p + t;
-            b.union(Self { min: image - off, max: image + off })
+            let image = Self { min: image - off, max: image + off };
+            b.union(if image.min.is_nan() || image.max.is_nan() { Self::EVERYTHING } else { image })
         })
     }
 

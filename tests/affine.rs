@@ -254,3 +254,11 @@ fn a_chains_bound_holds_where_its_maps_all_but_cancel() {
     println!("{hits} hits, at most {worst:.3} ulp");
     assert!(hits > 130 && worst <= 4.0);
 }
+
+#[test]
+fn images_that_overflow_are_anywhere() {
+    let map = DAffine3::from_cols(DVec3::splat(1e10), DVec3::splat(-1e10), DVec3::Z, DVec3::ZERO);
+    let points = [DVec3::new(5.0, 0.0, 0.0), DVec3::new(1e300, 1e300, 0.0), DVec3::ZERO];
+    assert!(Aabb::around_images(&points[..1], &map).contains(DVec3::splat(5e10)));
+    assert_eq!(Aabb::around_images(&points, &map), Aabb::EVERYTHING);
+}

@@ -11,7 +11,7 @@ use support::rng::Rng;
 use support::shapes::shape;
 use truehit::glam::{DVec2, DVec3};
 use truehit::kernel::frustum::{BASE, TOP, WALL};
-use truehit::{Cone, Cylinder, Interval, InvalidShape, Patch, Ray, Shape, Sphere, Surface, Tangent};
+use truehit::{Cone, Cylinder, Interval, InvalidShape, Patch, Ray, Scene, Shape, Sphere, Surface, Tangent};
 
 fn any_shape(rng: &mut Rng) -> Box<dyn Shape> {
     let (p, axis) = (rng.in_cube(5.0), rng.unit() * rng.log(0.1, 10.0));
@@ -168,6 +168,42 @@ fn boxes_are_tight() {
         );
         assert!((min - b.min).max_element() < 1e-5 * size && (b.max - max).max_element() < 1e-5 * size);
     }
+}
+
+/// Solids that are no thicker than a rounding of where they lie: their ends cannot be scaled to a difference.
+#[test]
+fn wafers_far_out_keep_their_direction() {
+    let mut hits = 0;
+    for (far, thin) in
+        [(1e200, 1e-200), (1e200, 1e-320), (1e100, 1e-150), (1e308, 1e-10), (1.0, 1e-300), (1e-100, 5e-324)]
+    {
+        for flip in [1.0, -1.0] {
+            let (base, top) = (DVec3::new(far, 0.0, 0.0), DVec3::new(far, flip * thin, 0.0));
+            let r = 0.5 * far;
+            let shapes: [Box<dyn Shape>; 3] = [
+                Box::new(Cylinder::new(base, top, r).unwrap()),
+                Box::new(Cone::new(base, top, r).unwrap()),
+                Box::new(Cone::truncated(base, top, r, 0.9 * r).unwrap()),
+            ];
+            for shape in shapes {
+                let ray = Ray::new([far, -flip * far, 0.2 * far], [0.0, flip * far, 0.0]);
+                let b = shape.bounds();
+                assert_eq!((b.min, b.max), (DVec3::new(0.5 * far, b.min.y, -r), DVec3::new(1.5 * far, b.max.y, r)));
+                let hit = shape.intersect(&ray, Interval::FORWARD).unwrap();
+                let (position, normal) = (shape.point(&ray, &hit).position, shape.normal(&ray, &hit));
+                assert!(((position - DVec3::new(far, 0.0, 0.2 * far)) / far).length() < 1e-15, "{position}");
+                assert_eq!(normal, DVec3::new(0.0, -flip, 0.0));
+                let uv = shape.texture_coordinates(&ray, &hit);
+                assert!(uv.cmpge(DVec2::ZERO).all() && uv.cmple(DVec2::ONE).all());
+                let mut builder = Scene::builder();
+                builder.push(shape, ());
+                assert_eq!(builder.build().intersect(&ray, Interval::FORWARD).map(|h| h.hit), Some(hit));
+                hits += 1;
+            }
+        }
+    }
+    println!("{hits} hits");
+    assert_eq!(hits, 36);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::local::{Local, around, length};
 use super::patch::Patch;
 use crate::kernel::bound::U;
-use crate::kernel::float::unit;
+use crate::kernel::float::{power, unit};
 use crate::kernel::frustum::{self, BASE, TOP};
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, SurfacePoint, Tangent};
 use glam::{DVec2, DVec3};
@@ -19,6 +19,9 @@ pub(super) struct Frustum {
 
 /// Where λ's own error moves a point by more than this part of the local radius, λ is asked for to a hundred bits.
 const SHARP: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// Local axes shorter than this are taken to be as long: no rounding of a point is as small, and squares keep their digits.
+const SHORTEST: f64 = power(-400);
 
 /// A hit's point taken apart, in local units: end + along·axis + radial, from the nearer end, so that a rim and an apex
 /// are met with their own rounding only.
@@ -77,11 +80,19 @@ impl Frustum {
         frustum::precise_lambda(ray, self.base, self.top, self.base_radius, self.top_radius, hit.lambda)
     }
 
+    /// From base to top, a unit vector. The difference comes first: scaled like its ends, a short axis far out would vanish.
+    fn direction(&self) -> DVec3 {
+        let v = self.top - self.base;
+        let v = if v.is_finite() { v } else { 0.5 * self.top - 0.5 * self.base };
+        unit(v).expect("two ends")
+    }
+
     fn foot(&self, ray: &Ray, hit: &Hit) -> Foot {
         let extent = self.base.abs().max(self.top.abs()).max(ray.origin.abs()).max_element();
         let local = Local::new(extent.max(self.base_radius).max(self.top_radius));
         let (r0, r1) = (local.length(self.base_radius), local.length(self.top_radius));
         let axis = local.vector(self.top) - local.vector(self.base);
+        let axis = if axis.abs().max_element() < SHORTEST { SHORTEST * self.direction() } else { axis };
         let foot = |lambda| {
             let from_base = local.offset(ray, lambda, self.base);
             let height = along(from_base, axis);
@@ -108,7 +119,7 @@ impl Frustum {
     }
 
     fn normal_at(&self, f: &Foot, ray: &Ray, hit: &Hit) -> DVec3 {
-        let axis = unit(f.axis).unwrap_or(DVec3::Z);
+        let axis = self.direction();
         match hit.part {
             BASE => -axis,
             TOP => axis,
@@ -157,9 +168,7 @@ impl Frustum {
 
     /// The box around both caps' circles: a circle of radius r across unit axis a reaches r·√(1 − aᵢ²) along i.
     pub(super) fn bounds(&self) -> Aabb {
-        let local = Local::new(self.top.abs().max(self.base.abs()).max_element());
-        let v = local.vector(self.top) - local.vector(self.base);
-        let v = unit(v).unwrap_or(DVec3::Z);
+        let v = self.direction();
         // Half-widths of a unit circle, rounded up: v is off by less than 8u relatively, in every component that has
         // not vanished in scaling.
         let along = self.top.cmpne(self.base);
@@ -180,7 +189,7 @@ impl Frustum {
 
     pub(super) fn texture_coordinates(&self, ray: &Ray, hit: &Hit) -> DVec2 {
         let f = self.foot(ray, hit);
-        let (e1, e2) = unit(f.axis).unwrap_or(DVec3::Z).any_orthonormal_pair();
+        let (e1, e2) = self.direction().any_orthonormal_pair();
         let (x, y) = (f.radial.dot(e1), f.radial.dot(e2));
         let planar = |r: f64| {
             let r = f.local.length(r);
@@ -230,7 +239,7 @@ impl Frustum {
     /// The wall's explicit form: angle in radians, height from 0 to 1.
     pub(super) fn patch(&self, angle: f64, height: f64) -> Patch {
         let v = self.top - self.base;
-        let (e1, e2) = unit(v).unwrap_or(DVec3::Z).any_orthonormal_pair();
+        let (e1, e2) = self.direction().any_orthonormal_pair();
         let (s, c) = angle.sin_cos();
         let (growth, outward) = (self.top_radius - self.base_radius, c * e1 + s * e2);
         let radius = self.base_radius + height * growth;
