@@ -105,8 +105,8 @@ pub(super) fn sides<S: Simd>(b: f32x8<S>) -> f32x4<S> {
     least + most
 }
 
-/// The binary tree; `nodes[0]` is the root, slot 1 is vacant and others may be, and siblings lie in pairs from slot 2 on,
-/// after their parents. No nodes if there are no items.
+/// The binary tree; `nodes[0]` is the root, slot 1 is vacant, and siblings lie in pairs from slot 2 on, after their
+/// parents. No nodes if there are no items.
 #[derive(Debug)]
 pub(super) struct Binary {
     pub(super) frame: Frame,
@@ -153,18 +153,18 @@ impl Binary {
             finite -= items.iter().filter(|i| infinite(i)).count();
             items.sort_by_key(infinite);
         }
-        let mut nodes = vec![Node::VACANT; 2 * items.len()];
+        let mut nodes = Vec::with_capacity(items.len());
         watch.phase(0.6, items.len());
         if !items.is_empty() {
-            let (root, slots) = nodes.split_at_mut(2);
+            nodes.extend([Node::VACANT; 2]);
             let builder = Builder { level, leaf, unit: unit(leaf), watch };
-            let at = Place { item: 0, slot: 2, depth: 0 };
-            root[0] = if 0 < finite && finite < items.len() {
+            let at = Place { item: 0, depth: 0 };
+            nodes[0] = if 0 < finite && finite < items.len() {
                 let (left, right) = items.split_at(finite);
                 let (left, right) = (around(left), around(right));
-                builder.inner(&mut items, slots, right, at, &Split { mid: finite, left, right })
+                builder.inner(&mut items, &mut nodes, right, at, &Split { mid: finite, left, right })
             } else {
-                builder.subdivide(&mut items, slots, all, at)
+                builder.subdivide(&mut items, &mut nodes, all, at)
             };
         }
         Self { frame, items, nodes }
@@ -223,13 +223,12 @@ struct Builder<'a, 'b> {
 #[derive(Clone, Copy)]
 struct Place {
     item: u32,
-    slot: u32,
     depth: u32,
 }
 
 impl Builder<'_, '_> {
-    /// The subtree over `items`; the nodes below its root go to `slots`, at most 2·n − 2 of them.
-    fn subdivide(self, items: &mut [Item], slots: &mut [Node], bounds: Box8, at: Place) -> Node {
+    /// The subtree over `items`; the nodes below its root are appended to `nodes`.
+    fn subdivide(self, items: &mut [Item], nodes: &mut Vec<Node>, bounds: Box8, at: Place) -> Node {
         let few = |items: &[Item]| {
             items.len() <= self.unit as usize && items.iter().map(Item::count).sum::<u32>() <= self.unit
         };
@@ -238,29 +237,36 @@ impl Builder<'_, '_> {
             return Node::new(min, max, at.item, items.len() as u32);
         }
         let split = dispatch!(self.level.token(), simd => split::split(simd, items, at.depth, self.leaf.ilog2()));
-        self.inner(items, slots, bounds, at, &split)
+        self.inner(items, nodes, bounds, at, &split)
     }
 
-    fn inner(self, items: &mut [Item], slots: &mut [Node], bounds: Box8, at: Place, split: &Split) -> Node {
+    fn inner(self, items: &mut [Item], nodes: &mut Vec<Node>, bounds: Box8, at: Place, split: &Split) -> Node {
         let n = items.len();
-        let parallel = n >= PARALLEL;
         let &Split { mid, left, right } = split;
-        let (pair, rest) = slots.split_at_mut(2);
-        let (before, after) = rest.split_at_mut(2 * mid - 2);
+        let pair = nodes.len();
+        nodes.extend([Node::VACANT; 2]);
         let (lower, upper) = items.split_at_mut(mid);
-        let left_at = Place { item: at.item, slot: at.slot + 2, depth: at.depth + 1 };
-        let right_at = Place { item: at.item + mid as u32, slot: at.slot + 2 * mid as u32, depth: at.depth + 1 };
-        let (l, r) = tasks::join(
-            parallel,
-            || self.subdivide(lower, before, left, left_at),
-            || self.subdivide(upper, after, right, right_at),
-        );
-        pair[0] = l;
-        pair[1] = r;
-        if parallel {
+        let left_at = Place { item: at.item, depth: at.depth + 1 };
+        let right_at = Place { item: at.item + mid as u32, depth: at.depth + 1 };
+        let (l, r) = if n >= PARALLEL && tasks::are_parallel() {
+            let mut others = Vec::with_capacity(upper.len());
+            let (l, r) = tasks::join(
+                true,
+                || self.subdivide(lower, nodes, left, left_at),
+                || self.subdivide(upper, &mut others, right, right_at),
+            );
+            let behind = nodes.len() as u32;
+            nodes.extend(others.iter().map(|node| node.moved(behind)));
+            (l, r.moved(behind))
+        } else {
+            (self.subdivide(lower, nodes, left, left_at), self.subdivide(upper, nodes, right, right_at))
+        };
+        if n >= PARALLEL {
             self.watch.add([mid, n - mid].into_iter().filter(|&n| n < PARALLEL).sum());
         }
+        nodes[pair] = l;
+        nodes[pair + 1] = r;
         let (min, max) = bounds.corners();
-        Node::new(min, max, at.slot, 0)
+        Node::new(min, max, pair as u32, 0)
     }
 }

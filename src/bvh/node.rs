@@ -23,7 +23,7 @@ const fn ordinary(number: u32) -> f32 {
 const LONGEST: Vec4 = Vec4::splat(1e9);
 
 impl Node {
-    /// Nobody's child, and nobody's parent.
+    /// Not there yet.
     pub(super) const VACANT: Self = Self::new([0.0; 3], [0.0; 3], 0, ORDINARY - 1);
 
     pub(super) const fn new([x, y, z]: [f32; 3], [u, v, w]: [f32; 3], first: u32, count: u32) -> Self {
@@ -77,5 +77,10 @@ impl Node {
     #[inline(always)]
     pub(super) fn above(&self, first: u32) -> Self {
         Self::new(self.min(), self.max(), first, 0)
+    }
+
+    /// With its children, if it has any, so many slots further.
+    pub(super) fn moved(&self, by: u32) -> Self {
+        if self.is_leaf() { *self } else { self.above(self.first() + by) }
     }
 }

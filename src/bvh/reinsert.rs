@@ -143,24 +143,11 @@ impl<'a> Tree<'a> {
         let mut rest = *self.node(from ^ 1);
         let (mut sibling, mut above) = (from ^ 1, parent);
         loop {
-            // What is saved, less what those on the way down to here grow by; where.
-            stack.push((saved, sibling));
-            while let Some((left, at)) = stack.pop() {
-                // Whatever it joins becomes no smaller than itself.
-                if left - area <= best.gain {
-                    continue;
-                }
-                let there = self.node(at);
-                let gain = left - there.common_area(&node);
-                if gain > best.gain && at != from ^ 1 && at != parent {
-                    best = Move { gain, from, to: at };
-                }
-                if !there.is_leaf() {
-                    let left = gain + there.half_area();
-                    if left - area > best.gain {
-                        stack.push((left, there.first() + 1));
-                        stack.push((left, there.first()));
-                    }
+            self.consider(saved, sibling, &node, area, &mut best, stack);
+            while let Some((left, first)) = stack.pop() {
+                if left - area > best.gain {
+                    self.consider(left, first + 1, &node, area, &mut best, stack);
+                    self.consider(left, first, &node, area, &mut best, stack);
                 }
             }
             if above != parent {
@@ -172,6 +159,22 @@ impl<'a> Tree<'a> {
             }
             sibling = above ^ 1;
             above = self.parent(above);
+        }
+    }
+
+    /// The place beside `at`, where `left` is what is saved less what those above grow by; and, on the stack, those below.
+    #[inline(always)]
+    fn consider(&self, left: f32, at: u32, node: &Node, area: f32, best: &mut Move, stack: &mut Vec<(f32, u32)>) {
+        let there = self.node(at);
+        let gain = left - there.common_area(node);
+        if gain > best.gain && at != best.from ^ 1 && at != self.parent(best.from) {
+            best.gain = gain;
+            best.to = at;
+        }
+        // Whatever it joins becomes no smaller than itself.
+        let left = gain + there.half_area();
+        if left - area > best.gain && !there.is_leaf() {
+            stack.push((left, there.first()));
         }
     }
 

@@ -1,5 +1,14 @@
 //! Work for all cores, or for one without the feature `rayon`; the results are the same.
 
+/// Whether there is more than one thread.
+#[inline]
+pub(crate) fn are_parallel() -> bool {
+    #[cfg(feature = "rayon")]
+    return rayon::current_num_threads() > 1;
+    #[cfg(not(feature = "rayon"))]
+    false
+}
+
 /// Both, at the same time if `parallel`. Where there is one thread the caller's does it: the pool's would find nothing in
 /// its cache.
 #[inline]
@@ -9,7 +18,7 @@ pub(crate) fn join<A: Send, B: Send>(
     b: impl FnOnce() -> B + Send,
 ) -> (A, B) {
     #[cfg(feature = "rayon")]
-    if parallel && rayon::current_num_threads() > 1 {
+    if parallel && are_parallel() {
         return rayon::join(a, b);
     }
     let _ = parallel;
@@ -29,7 +38,7 @@ pub(crate) fn map_with<T: Send, R>(
     f: impl Fn(&mut R, usize) -> T + Sync + Send,
 ) -> Vec<T> {
     #[cfg(feature = "rayon")]
-    if parallel && rayon::current_num_threads() > 1 {
+    if parallel && are_parallel() {
         use rayon::prelude::*;
         return (0..n).into_par_iter().map_init(own, f).collect();
     }
