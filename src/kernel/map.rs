@@ -254,7 +254,8 @@ impl Map {
         )
     }
 
-    /// No closures: what is not inlined would be compiled without the instructions that `L` needs.
+    /// Without closures, which are compiled without the instructions that `L` needs where they are not inlined; those of
+    /// [`cpu::dispatch_lanes`] always are.
     #[inline(always)]
     fn image_with<L: Lanes>(&self, cpu: L::Cpu, ray: &Ray) -> Image {
         let (o, d) = (ray.origin, ray.direction);
@@ -403,6 +404,7 @@ fn product<L: Lanes>(m: [L; 3], v: DVec3, t: L, low: L) -> Sum {
     Sum::new(hi, lo, size * t.splat(40.0 * U * U))
 }
 
+/// [`product`] in three floats a sum, of a map in two floats an entry.
 #[inline(always)]
 fn close_product<L: Lanes>(m: [L; 3], m_low: [L; 3], v: DVec3, t: L, t_low: L) -> Sum {
     let (hi, lo, error) = close_sum(m, m_low, [t.splat(v.x), t.splat(v.y), t.splat(v.z)], t, t_low);
