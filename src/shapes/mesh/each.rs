@@ -21,6 +21,7 @@ pub(super) fn closest(mesh: &Mesh, rays: &[Stretch], hits: &mut [Option<Hit>]) {
         rays,
         hits,
         |rays, hits| dispatch!(mesh.level.of_many(), simd => closest_with(simd, mesh, rays, &mut bundle, hits)),
+        go_together,
         |(ray, within), hit| query::find_closest(mesh, ray, *within, hit),
     );
 }
@@ -32,16 +33,18 @@ pub(super) fn any(mesh: &Mesh, rays: &[Stretch], hits: &mut [bool]) {
         rays,
         hits,
         |rays, hits| dispatch!(mesh.level.of_many(), simd => any_with(simd, mesh, rays, &mut bundle, hits)),
+        |rays| go_together(rays) || end_together(rays),
         |(ray, within), hit| *hit = query::any(mesh, ray, *within),
     );
 }
 
 /// A bundle at a time by `together`, which may refuse, the others one by one. After a refusal bundles are tried ever more
-/// seldom, so that rays without any order cost no more than alone.
+/// seldom, so that rays without any order cost no more than alone. What is left of the slice is tried if it `may` be a bundle.
 fn each<T: Copy + Default>(
     rays: &[Stretch],
     hits: &mut [T],
     mut together: impl FnMut(&[Stretch; RAYS], &mut [T; RAYS]) -> bool,
+    may: impl Fn(&[Stretch]) -> bool,
     alone: impl Fn(&Stretch, &mut T),
 ) {
     const MOST_PATIENT: u32 = 64;
@@ -62,7 +65,7 @@ fn each<T: Copy + Default>(
             alone(ray, hit);
         }
     }
-    if rest.len() >= FEWEST && wait == 0 && (go_together(rest) || end_together(rest)) {
+    if rest.len() >= FEWEST && wait == 0 && may(rest) {
         // The last of them stands for those that are not there.
         let (mut rays, mut answers) = ([rest[rest.len() - 1]; RAYS], [T::default(); RAYS]);
         rays[..rest.len()].copy_from_slice(rest);
