@@ -2,7 +2,7 @@
 
 use crate::kernel::bound::{INFLATE, U};
 use crate::kernel::eft::{two_diff, two_sum};
-use crate::kernel::float::{exponent_of, ldexp, power, unit};
+use crate::kernel::float::{exponent_of, ldexp, length, power, unit};
 use crate::kernel::map::{Image, Map, Unusable, inverse, taxicab, transform_point};
 use crate::kernel::tally;
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint, Tangent};
@@ -341,7 +341,7 @@ impl<S: Shape> Shape for Affine<S> {
         // An object-space error ε is at most ‖W‖ε here; along the normal, where it lies, it is ε/|Mᵀn|.
         let stretched = error * largest_stretch(&self.world_from_innermost.matrix3);
         let Tangent { normal, curvature, .. } = self.innermost().tangent(&object_ray, hit);
-        let shrunk = self.across(normal).length();
+        let shrunk = length(self.across(normal));
         let across = 1.01 * error / shrunk;
         let bends = self.curved(curvature, shrunk) * across;
         let off = if bends < 0.005 && across < stretched { across } else { stretched };
@@ -367,7 +367,7 @@ impl<S: Shape> Shape for Affine<S> {
 
     fn tangent(&self, world_ray: &Ray, hit: &Hit) -> Tangent {
         let Tangent { normal, normal_error, curvature } = self.innermost().tangent(&self.object_ray(world_ray), hit);
-        let shrunk = self.across(normal).length();
+        let shrunk = length(self.across(normal));
         // |δ(Mᵀn)| ≤ ‖M‖(|δn| + a few u); of it only what is across Mᵀn turns the unit vector.
         let turned = 1.01 * (normal_error + 8.0 * U) * (self.norm() / shrunk);
         let curvature = self.curved(curvature, shrunk);

@@ -1,5 +1,6 @@
 //! What a ray can meet.
 
+use crate::kernel::float::length;
 use crate::kernel::map::Map;
 use crate::{Aabb, Hit, Interval, Ray};
 use glam::{DAffine3, DVec2, DVec3};
@@ -57,7 +58,7 @@ pub trait Shape: Debug + Send + Sync {
         let step = hit.lambda * ray.direction;
         let size = ray.origin.abs() + step.abs();
         // Two roundings of the components, and λ's own error.
-        let error = 4.0 * f64::EPSILON * size.max_element() + 2.0 * hit.error * ray.direction.length();
+        let error = 4.0 * f64::EPSILON * size.max_element() + 2.0 * hit.error * length(ray.direction);
         SurfacePoint { position: ray.origin + step, error }
     }
 

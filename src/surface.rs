@@ -65,8 +65,8 @@ impl<'a> Surface<'a> {
     }
 
     /// A ray that leaves the surface along `direction` (any non-zero length): it never meets the piece of surface it
-    /// starts on, on its way out. A direction with a positive component along the normal leaves outward, any other
-    /// inward (a refracted ray: it meets a solid's far side as it should).
+    /// starts on, on its way out. A direction with a negative component along the normal leaves inward (a refracted ray:
+    /// it meets a solid's far side as it should), any other outward.
     ///
     /// The origin is [`point`](Self::point) moved off the surface by its own error bound, and further only if the
     /// shape's exact test says that it is not yet clear: a few units in the last place, no epsilon.

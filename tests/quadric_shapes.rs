@@ -206,6 +206,35 @@ fn wafers_far_out_keep_their_direction() {
     assert_eq!(hits, 36);
 }
 
+/// Small solids seen from where they are nearly a point.
+#[test]
+fn needles_and_wafers_of_any_size_have_points_in_their_boxes() {
+    let mut rng = Rng::new(12);
+    let mut hits = 0;
+    for e in [-900, -600, -402, -398, -100, 0, 300] {
+        for _ in 0..2_000 {
+            let s = truehit::kernel::float::ldexp(1.0, e);
+            let (base, axis) = (s * rng.in_cube(5.0), s * rng.unit() * rng.log(1e-7, 1e7));
+            let (r, q) = (s * rng.log(1e-7, 1e7), s * rng.log(1e-7, 1e7));
+            let shape = Cone::truncated(base, base + axis, r, q).unwrap();
+            let b = shape.bounds();
+            let target = b.center() + 0.4 * rng.in_cube(1.0) * b.size();
+            let origin = [target + 2.0 * b.size().max_element() * rng.unit(), rng.unit()][rng.below(2) as usize];
+            let ray = Ray::new(origin, target - origin);
+            let Some(hit) = shape.intersect(&ray, Interval::FORWARD) else { continue };
+            hits += 1;
+            let (point, normal) = (shape.point(&ray, &hit), shape.normal(&ray, &hit));
+            let slack = DVec3::splat(point.error);
+            assert!((b.min - slack).cmple(point.position).all(), "{shape:?} {ray:?} {hit:?} {point:?}");
+            assert!(point.position.cmple(b.max + slack).all(), "{shape:?} {ray:?} {hit:?} {point:?}");
+            assert!(point.error < 1e-14 * b.min.abs().max(b.max.abs()).max_element(), "{shape:?} {ray:?} {point:?}");
+            assert!((normal.length() - 1.0).abs() < 1e-15);
+        }
+    }
+    println!("{hits} hits");
+    assert!(hits > 4_000);
+}
+
 #[test]
 fn parts_normals_and_texture_of_a_can_and_a_hat() {
     let can = Cylinder::new([0.0; 3], [0.0, 0.0, 2.0], 1.0).unwrap();

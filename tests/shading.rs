@@ -361,7 +361,7 @@ fn images_lie_upright_repeat_and_interpolate_in_linear_light() {
 
 #[test]
 fn bad_pictures_are_no_textures() {
-    for (width, height, bytes) in [(0, 0, 0), (0, 5, 0), (2, 2, 11), (2, 2, 13), (1, 1, 0)] {
+    for (width, height, bytes) in [(0, 0, 0), (0, 5, 0), (2, 2, 11), (2, 2, 13), (1, 1, 0), (u32::MAX, u32::MAX, 3)] {
         let error = ImageTexture::from_srgb8(width, height, &vec![0; bytes]).unwrap_err();
         assert_eq!(error, InvalidTexture { width, height, bytes });
     }

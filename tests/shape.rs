@@ -4,7 +4,7 @@ mod support;
 
 use support::rng::Rng;
 use truehit::glam::{DAffine3, DMat3, DQuat, DVec3};
-use truehit::{Affine, Cylinder, Interval, InvalidShape, Plane, Polygon, Ray, Shape, Sphere, Triangle};
+use truehit::{Affine, Cylinder, Interval, InvalidShape, Mesh, Plane, Polygon, Ray, Shape, Sphere, Triangle};
 
 const F: Interval = Interval::FORWARD;
 
@@ -111,4 +111,34 @@ fn shapes_under_maps_keep_their_promises() {
     }
     println!("{} hits, {} rays spawned that must not come back", seen[0], seen[1]);
     assert!(seen[0] > 2500 && seen[1] > 5000);
+}
+
+#[test]
+fn flat_shapes_have_points_at_every_scale() {
+    let mut hits = 0;
+    for e in [-950, -600, -300, 0, 300, 600, 990, 1000, 1018] {
+        let s = truehit::kernel::float::ldexp(1.0, e);
+        let corners = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]].map(|[x, y]| DVec3::new(x * s, y * s, s));
+        let [a, b, c, d] = corners;
+        let shapes: [Box<dyn Shape>; 4] = [
+            Box::new(Plane::new(a, DVec3::Z).unwrap()),
+            Box::new(Polygon::new(&corners).unwrap()),
+            Box::new(Triangle::new(a, b, c).unwrap()),
+            Box::new(Mesh::new(vec![a, b, c, d], vec![[0, 1, 2], [0, 2, 3]]).unwrap()),
+        ];
+        for shape in shapes {
+            let ray = Ray::new([2.0 * s, s, 5.0 * s], [0.0, 0.0, -2.0]);
+            let hit = shape.intersect(&ray, F).unwrap();
+            let point = shape.point(&ray, &hit);
+            // Of the order of an ulp of its coordinates.
+            let bound = point.error / s;
+            assert!(hit.lambda == 2.0 * s, "{shape:?}: {hit:?}");
+            assert!((1e-17..1e-13).contains(&bound), "{shape:?}: {point:?}");
+            assert!((point.position / s - DVec3::new(2.0, 1.0, 1.0)).length() < 1e-14, "{shape:?}: {point:?}");
+            assert!(shape.texture_coordinates(&ray, &hit).is_finite(), "{shape:?}");
+            assert_eq!(shape.normal(&ray, &hit), DVec3::Z);
+            hits += 1;
+        }
+    }
+    assert_eq!(hits, 36);
 }

@@ -47,6 +47,23 @@ pub const fn power(e: i32) -> f64 {
     f64::from_bits(((e + 1023) as u64) << 52)
 }
 
+/// Squares of numbers beyond these might leave the range.
+fn has_squares(x: f64) -> bool {
+    x > power(-400) && x < power(400)
+}
+
+/// |v|, whatever its range.
+#[inline]
+#[must_use]
+pub fn length(v: DVec3) -> f64 {
+    let longest = v.abs().max_element();
+    if has_squares(longest) {
+        return v.length();
+    }
+    let e = exponent_of(longest);
+    ldexp(v.map(|x| ldexp(x, -e)).length(), e)
+}
+
 /// `v` over its length, whatever that is; `None` for zero, infinite or NaN.
 #[inline]
 #[must_use]
@@ -55,9 +72,7 @@ pub fn unit(v: DVec3) -> Option<DVec3> {
     if !(longest > 0.0 && v.is_finite()) {
         return None;
     }
-    // Squares of numbers beyond these might leave the range.
-    let ordinary = longest > power(-400) && longest < power(400);
-    let v = if ordinary { v } else { v.map(|x| ldexp(x, -exponent_of(longest))) };
+    let v = if has_squares(longest) { v } else { v.map(|x| ldexp(x, -exponent_of(longest))) };
     Some(v / v.length())
 }
 
@@ -67,6 +82,16 @@ mod tests {
     use super::super::number::Number;
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn lengths_have_no_range() {
+        for e in [-1074, -1000, -540, 0, 540, 1000] {
+            let v = DVec3::new(3.0, 0.0, 4.0).map(|x| ldexp(x, e));
+            assert_eq!(length(v), ldexp(5.0, e), "{e}");
+        }
+        assert_eq!(length(DVec3::ZERO), 0.0);
+        assert_eq!(length(DVec3::new(f64::INFINITY, 1.0, 0.0)), f64::INFINITY);
+    }
 
     #[test]
     fn units_have_no_range() {

@@ -235,6 +235,10 @@ pub fn project(point: DVec3, [n, n_lo]: [DVec3; 2], x: DVec3) -> (DVec3, f64) {
     let k = -exponent_of(n.abs().max_element());
     let scaled = |v: DVec3| DVec3::from(v.to_array().map(|x| ldexp(x, k)));
     let (n, n_lo) = (scaled(n), scaled(n_lo));
+    // Nor do the largest coordinates overflow.
+    let far = x.abs().max(point.abs()).max_element() > power(900);
+    let (down, up) = if far { (power(-200), power(200)) } else { (1.0, 1.0) };
+    let (x, point) = (x * down, point * down);
     let ((sx, tx), (sy, ty), (sz, tz)) = (two_diff(x.x, point.x), two_diff(x.y, point.y), two_diff(x.z, point.z));
     let (s, s_lo) = (DVec3::new(sx, sy, sz), DVec3::new(tx, ty, tz));
     let (h, h_lo, size) = dot2::<Split>(n, s, n.dot(s_lo) + n_lo.dot(s));
@@ -242,7 +246,7 @@ pub fn project(point: DVec3, [n, n_lo]: [DVec3; 2], x: DVec3) -> (DVec3, f64) {
     let moved = x - n * (h / (length * length));
     let off = (34.0 * U * U * size + 8.0 * U * h.abs() + UNDERFLOW) / length;
     let rounding = U * n.abs().dot(moved.abs()) / length;
-    (moved, (off + rounding) * (1.0 + 16.0 * U))
+    (moved * up, (off + rounding) * (1.0 + 16.0 * U) * up)
 }
 
 #[cfg(test)]

@@ -59,8 +59,8 @@ impl ImageTexture {
     /// # Errors
     /// [`InvalidTexture`] if there are no texels, or not three bytes for each.
     pub fn from_srgb8(width: u32, height: u32, bytes: &[u8]) -> Result<Self, InvalidTexture> {
-        let needed = width as usize * height as usize * 3;
-        if needed == 0 || bytes.len() != needed {
+        let needed = (u64::from(width) * u64::from(height)).checked_mul(3);
+        if bytes.is_empty() || needed != Some(bytes.len() as u64) {
             return Err(InvalidTexture { width, height, bytes: bytes.len() });
         }
         let linear: Vec<f32> = (0..=255_u8).map(|byte| decode(f64::from(byte) / 255.0) as f32).collect();

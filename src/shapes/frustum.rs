@@ -1,9 +1,9 @@
 //! What cylinder, cone and truncated cone have in common: the capped frustum.
 
-use super::local::{Local, around, length};
+use super::local::{Local, around};
 use super::patch::Patch;
 use crate::kernel::bound::U;
-use crate::kernel::float::{power, unit};
+use crate::kernel::float::{length, unit};
 use crate::kernel::frustum::{self, BASE, TOP};
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, SurfacePoint, Tangent};
 use glam::{DVec2, DVec3};
@@ -19,9 +19,6 @@ pub(super) struct Frustum {
 
 /// Where λ's own error moves a point by more than this part of the local radius, λ is asked for to a hundred bits.
 const SHARP: f64 = 1.0 / (1u64 << 40) as f64;
-
-/// Local axes shorter than this are taken to be as long: no rounding of a point is as small, and squares keep their digits.
-const SHORTEST: f64 = power(-400);
 
 /// A hit's point taken apart, in local units: end + along·axis + radial, from the nearer end, so that a rim and an apex
 /// are met with their own rounding only.
@@ -92,7 +89,7 @@ impl Frustum {
         let local = Local::new(extent.max(self.base_radius).max(self.top_radius));
         let (r0, r1) = (local.length(self.base_radius), local.length(self.top_radius));
         let axis = local.vector(self.top) - local.vector(self.base);
-        let axis = if axis.abs().max_element() < SHORTEST { SHORTEST * self.direction() } else { axis };
+        let axis = if axis.abs().max_element() < local.lost() { local.lost() * self.direction() } else { axis };
         let foot = |lambda| {
             let from_base = local.offset(ray, lambda, self.base);
             let height = along(from_base, axis);
@@ -163,7 +160,7 @@ impl Frustum {
             + 6.0 * f.local.outside(length(f.axis))
             + 2.0 * length(foot)
             + 2.0 * length(position);
-        SurfacePoint { position, error: U * sizes + f64::from_bits(16) }
+        SurfacePoint { position, error: U * sizes + f.local.outside(f.local.lost()) + f64::from_bits(16) }
     }
 
     /// The box around both caps' circles: a circle of radius r across unit axis a reaches r·√(1 − aᵢ²) along i.

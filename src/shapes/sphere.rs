@@ -1,8 +1,10 @@
 //! The sphere.
 
-use super::local::{Local, around, length};
+use super::local::{Local, around};
 use super::patch::Patch;
-use crate::kernel::{bound::U, float::unit, sphere};
+use crate::kernel::bound::U;
+use crate::kernel::float::{length, unit};
+use crate::kernel::sphere;
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint, Tangent};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};

@@ -10,7 +10,7 @@ use crate::kernel::cpu;
 use crate::kernel::dyadic::Dyadic;
 use crate::kernel::eft::{Fused, Product, Split, two_diff, two_sum};
 use crate::kernel::fixed;
-use crate::kernel::float::power;
+use crate::kernel::float::{length, power};
 use crate::kernel::lanes::{Double, Lanes, Two};
 use crate::kernel::number::{self, Number, cross, difference, dot, vector};
 use crate::kernel::ratio::{self, Ratio};
@@ -526,7 +526,7 @@ pub fn point(ray: &Ray, vertices: &[DVec3; 3], uv: DVec2) -> (DVec3, f64) {
     let position = a + (f + g);
     // Each of b−a, its multiple and their sum is rounded, then the sum with a; underflow is below the last place.
     let off = 3.0 * (f.abs() + g.abs()) + position.abs();
-    (position, U * off.length() * (1.0 + 8.0 * U) + f64::MIN_POSITIVE)
+    (position, U * length(off) * (1.0 + 8.0 * U) + f64::MIN_POSITIVE)
 }
 
 /// On which side of the triangle's plane `point` lies, exactly: the sign of n·(point − a), n = (b−a)×(c−a).
