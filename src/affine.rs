@@ -197,21 +197,20 @@ impl<S: Shape> Affine<S> {
         (0.0, if widest.is_finite() { widest } else { f64::INFINITY })
     }
 
-    /// Next to a limit: the first hit of which the corrected λ lies inside `within`. Where that is not known, the rounded
-    /// image decides.
+    /// Next to a limit: the first hit of which the corrected λ lies inside `within`, from the first one in `zone` on. Where
+    /// that is not known, the rounded image decides.
     #[cold]
     #[inline(never)]
-    fn next_to_limit(&self, image: &Image, within: Interval) -> Option<Hit> {
+    fn next_to_limit(&self, image: &Image, mut hit: Hit, mut zone: Interval, within: Interval) -> Option<Hit> {
         tally::refined();
-        let mut zone = widened(image, within);
         loop {
-            let hit = self.innermost().intersect(&image.ray, zone)?;
             match self.place(image, &hit, within, zone.min) {
                 Place::Before => {}
                 Place::Inside(hit) => return Some(hit),
                 Place::Beyond => return None,
             }
             zone.min = past(&hit, zone);
+            hit = self.innermost().intersect(&image.ray, zone)?;
         }
     }
 
@@ -306,7 +305,7 @@ impl<S: Shape> Shape for Affine<S> {
         if lambda - error > within.min && lambda + error < within.max {
             return Some(Hit { lambda, error, ..hit });
         }
-        self.next_to_limit(&image, within)
+        self.next_to_limit(&image, hit, zone, within)
     }
 
     fn normal(&self, world_ray: &Ray, hit: &Hit) -> DVec3 {
