@@ -115,24 +115,18 @@ impl Bvh {
     #[inline(always)]
     fn closest_with<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, visit: &mut impl FnMut(u32, f64) -> f64) {
         match LocalRay::new(simd, &self.tree.frame, ray, within) {
-            Some(local) => self.closest_along(simd, &local, within.max, visit),
-            None => self.closest_from_afar(simd, ray, within, visit),
+            Some(local) => self.closest_along::<S, true>(simd, &local, within.max, visit),
+            None => self.closest_uncommon(simd, ray, within, visit),
         }
     }
 
     #[inline(never)]
-    fn closest_from_afar<S: Simd>(
-        &self,
-        simd: S,
-        ray: &Ray,
-        within: Interval,
-        visit: &mut impl FnMut(u32, f64) -> f64,
-    ) {
+    fn closest_uncommon<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, visit: &mut impl FnMut(u32, f64) -> f64) {
         simd.vectorize(
             #[inline(always)]
             || {
-                if let Some(local) = LocalRay::from_afar(simd, &self.tree.frame, ray, within) {
-                    self.closest_along(simd, &local, within.max, visit);
+                if let Some(local) = LocalRay::uncommon(simd, &self.tree.frame, ray, within) {
+                    self.closest_along::<S, false>(simd, &local, within.max, visit);
                 } else if !within.is_empty() && ray.is_valid() {
                     // No place in the frame: every object.
                     self.objects.iter().fold(within.max, |bound, &object| visit(object, bound));
@@ -142,9 +136,15 @@ impl Bvh {
     }
 
     #[inline(always)]
-    fn closest_along<S: Simd>(&self, simd: S, local: &LocalRay, bound: f64, visit: &mut impl FnMut(u32, f64) -> f64) {
+    fn closest_along<S: Simd, const FORWARD: bool>(
+        &self,
+        simd: S,
+        local: &LocalRay,
+        bound: f64,
+        visit: &mut impl FnMut(u32, f64) -> f64,
+    ) {
         let mut nearest = Nearest { bvh: self, local, bound, visit };
-        closest(simd, &self.tree, &Lanes::new(simd, local), local.t_max, &mut nearest);
+        closest(simd, &self.tree, &Lanes::<S, FORWARD>::new(simd, local), local.t_max, &mut nearest);
     }
 
     /// Whether `hits(object)` for any object whose box the ray meets inside `within`; asks until the first yes.
@@ -156,25 +156,30 @@ impl Bvh {
     #[inline(always)]
     fn any_with<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, hits: &mut impl FnMut(u32) -> bool) -> bool {
         match LocalRay::new(simd, &self.tree.frame, ray, within) {
-            Some(local) => self.any_along(simd, &local, hits),
-            None => self.any_from_afar(simd, ray, within, hits),
+            Some(local) => self.any_along::<S, true>(simd, &local, hits),
+            None => self.any_uncommon(simd, ray, within, hits),
         }
     }
 
     #[inline(never)]
-    fn any_from_afar<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, hits: &mut impl FnMut(u32) -> bool) -> bool {
+    fn any_uncommon<S: Simd>(&self, simd: S, ray: &Ray, within: Interval, hits: &mut impl FnMut(u32) -> bool) -> bool {
         simd.vectorize(
             #[inline(always)]
-            || match LocalRay::from_afar(simd, &self.tree.frame, ray, within) {
-                Some(local) => self.any_along(simd, &local, hits),
+            || match LocalRay::uncommon(simd, &self.tree.frame, ray, within) {
+                Some(local) => self.any_along::<S, false>(simd, &local, hits),
                 None => !within.is_empty() && ray.is_valid() && self.objects.iter().any(|&o| hits(o)),
             },
         )
     }
 
     #[inline(always)]
-    fn any_along<S: Simd>(&self, simd: S, local: &LocalRay, hits: &mut impl FnMut(u32) -> bool) -> bool {
-        any(simd, &self.tree, &Lanes::new(simd, local), local.t_max, &mut First { bvh: self, hits })
+    fn any_along<S: Simd, const FORWARD: bool>(
+        &self,
+        simd: S,
+        local: &LocalRay,
+        hits: &mut impl FnMut(u32) -> bool,
+    ) -> bool {
+        any(simd, &self.tree, &Lanes::<S, FORWARD>::new(simd, local), local.t_max, &mut First { bvh: self, hits })
     }
 
     /// Uses the instructions of `level` from now on, if this CPU has them: for tests and benchmarks. All levels give

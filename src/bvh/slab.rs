@@ -81,34 +81,29 @@ struct Placed<S: Simd> {
 }
 
 impl LocalRay {
-    /// A ray that is taken as it is, as nearly all are. `None` for others, which are for [`from_afar`](Self::from_afar) in a function of
-    /// its own: what follows is compiled for the constants here.
+    /// A ray that is taken as it is, from its origin on, as nearly all are: `t_min` ≥ 0. `None` for others, which are for
+    /// [`uncommon`](Self::uncommon) in a function of its own: what follows is compiled for the constants here.
     #[inline(always)]
     pub(crate) fn new<S: Simd>(simd: S, frame: &Frame, ray: &Ray, within: Interval) -> Option<Self> {
-        let pair = |x: f64, y: f64| f64x2::<S>::simd_from(simd, [x, y]);
-        let (o, d, c) = (ray.origin, ray.direction, frame.center);
-        let direction = (pair(d.x, d.y) * frame.scale).relaxed_narrow(pair(d.z, 0.0) * frame.scale);
-        let origin = ((pair(o.x, o.y) - pair(c.x, c.y)) * frame.scale)
-            .relaxed_narrow((pair(o.z, 0.0) - pair(c.z, 0.0)) * frame.scale);
-        let length = direction.abs().reduce_max();
-        let near = origin.abs().simd_le(NEAR) & direction.abs().simd_le(LENGTHS[1]);
+        let (placed, length) = as_it_is(simd, frame, ray)?;
         // A NaN fails every comparison.
-        if !((near.to_bitmask() == 0xf) & (length >= LENGTHS[0]) & !within.is_empty()) {
+        if !((within.min >= 0.0) & (within.min < within.max)) {
             return None;
         }
-        let placed = Placed { origin, direction, error: PLAIN_ERROR, steepest: STEEPEST, limits: Limits::PLAIN };
         Some(Self::placed(&placed, length, ray, plain_ends(simd, within)))
     }
 
     /// Any other ray. `None` where it cannot be expressed in the frame (then every leaf is visited): origins 2⁵⁰ times farther
     /// than the tree is wide, and directions as extreme; also for rays that are not valid and for empty intervals.
     #[inline(always)]
-    pub(crate) fn from_afar<S: Simd>(simd: S, frame: &Frame, ray: &Ray, within: Interval) -> Option<Self> {
+    pub(crate) fn uncommon<S: Simd>(simd: S, frame: &Frame, ray: &Ray, within: Interval) -> Option<Self> {
         if within.is_empty() {
             return None;
         }
-        let placed = place(simd, frame, ray)?;
-        let length = placed.direction.abs().reduce_max();
+        let (placed, length) = match as_it_is(simd, frame, ray) {
+            Some(both) => both,
+            None => place(simd, frame, ray)?,
+        };
         let ends = placed.limits.of(simd, within);
         Some(Self::placed(&placed, length, ray, ends))
     }
@@ -178,14 +173,14 @@ impl Limits {
     }
 }
 
-/// [`Limits::of`] for t = λ, in f32: rounded first, then moved by four roundings.
+/// [`Limits::of`] for t = λ ≥ 0, in f32: rounded first, then moved by four roundings, to zero at least.
 #[inline(always)]
 fn plain_ends<S: Simd>(simd: S, within: Interval) -> [f32; 4] {
     let splat = |x: f32| f32x4::<S>::splat(simd, x);
     let ends = f64x2::<S>::simd_from(simd, [within.min, within.max]);
-    let t = ends.relaxed_narrow(ends).min(splat(FARTHEST_T as f32)).max(splat(-FARTHEST_T as f32));
-    let half = t.abs().mul_add(splat(4.0 * E), splat(TINY as f32));
-    half.mul_add(f32x4::simd_from(simd, [-1.0, -1.0, 1.0, 1.0]), t).into()
+    let t = ends.relaxed_narrow(ends).min(splat(FARTHEST_T as f32));
+    let half = t.mul_add(splat(4.0 * E), splat(TINY as f32));
+    half.mul_add(f32x4::simd_from(simd, [-1.0, -1.0, 1.0, 1.0]), t).max(splat(0.0)).into()
 }
 
 /// Beyond this limits are all alike.
@@ -209,9 +204,27 @@ impl Sure {
     }
 }
 
-/// Rays from far outside, and with very long or short directions.
+/// A ray in the frame with nothing but roundings, and the largest coordinate of its direction.
 #[inline(always)]
-fn place<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<Placed<S>> {
+fn as_it_is<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<(Placed<S>, f32)> {
+    let pair = |x: f64, y: f64| f64x2::<S>::simd_from(simd, [x, y]);
+    let (o, d, c) = (ray.origin, ray.direction, frame.center);
+    let direction = (pair(d.x, d.y) * frame.scale).relaxed_narrow(pair(d.z, 0.0) * frame.scale);
+    let origin = ((pair(o.x, o.y) - pair(c.x, c.y)) * frame.scale)
+        .relaxed_narrow((pair(o.z, 0.0) - pair(c.z, 0.0)) * frame.scale);
+    let length = direction.abs().reduce_max();
+    let near = origin.abs().simd_le(NEAR) & direction.abs().simd_le(LENGTHS[1]);
+    // A NaN fails every comparison.
+    if !((near.to_bitmask() == 0xf) & (length >= LENGTHS[0])) {
+        return None;
+    }
+    let placed = Placed { origin, direction, error: PLAIN_ERROR, steepest: STEEPEST, limits: Limits::PLAIN };
+    Some((placed, length))
+}
+
+/// Rays from far outside, and with very long or short directions; as [`as_it_is`].
+#[inline(always)]
+fn place<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<(Placed<S>, f32)> {
     let e = exponent_of_normal(largest(ray.direction));
     let k = e - frame.exponent;
     // A zero or subnormal direction has e = −1023, an infinite one e = 1024.
@@ -232,14 +245,16 @@ fn place<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<Placed<S>> {
     }
     let narrow =
         |v: DVec3| f64x2::<S>::simd_from(simd, [v.x, v.y]).relaxed_narrow(f64x2::<S>::simd_from(simd, [v.z, 0.0]));
-    Some(Placed {
+    let direction = narrow(direction);
+    let placed = Placed {
         origin: narrow(origin),
-        direction: narrow(direction),
+        direction,
         // u·(|start| + |t·direction| + |origin|) ≤ u·(1 + 2 + 3)·reach, and the underflow of all; up by 2⁻¹⁰.
         error: (4.004 * f64::EPSILON * reach + f64::from(f32::MIN_POSITIVE)) as f32,
         steepest: LENGTHS[1],
         limits: Limits { stretch: power(k), advance },
-    })
+    };
+    Some((placed, direction.abs().reduce_max()))
 }
 
 /// The ray moved to where its steepest coordinate is zero, and by how much: the whole tree lies within ±1 of there.

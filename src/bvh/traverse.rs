@@ -5,68 +5,71 @@
 
 use super::slab::LocalRay;
 use super::wide::{CHILDREN, LEAF, NONE, Wide, WideNode, near_rows};
-use fearless_simd::{Simd, f32x8, prelude::*};
+use fearless_simd::{Simd, f32x8, i32x8, prelude::*};
 
 /// What is left to visit, each with the t where its box begins in the highest bits. As signed integers they sort as t does, but for
 /// negative ones among themselves: boxes that the ray starts in come first. Kept in a fixed array; what does not fit,
 /// which no sensible tree needs, goes to the heap.
-#[repr(C, align(32))]
-struct Stack {
-    entries: [i64; ROOM],
+/// The two memories are elsewhere, so that the length stays in a register.
+struct Stack<'a> {
+    entries: &'a mut Entries,
     len: usize,
-    spilled: Vec<i64>,
+    spilled: &'a mut Vec<i64>,
 }
+
+/// Aligned, since it is cleared by vectors.
+#[repr(align(32))]
+struct Entries([i64; ROOM]);
 
 const ROOM: usize = 32;
 
-impl Stack {
+impl<'a> Stack<'a> {
     #[inline(always)]
-    fn new() -> Self {
-        Self { entries: [0; ROOM], len: 0, spilled: Vec::new() }
+    fn new(entries: &'a mut Entries, spilled: &'a mut Vec<i64>) -> Self {
+        Self { entries, len: 0, spilled }
+    }
+
+    #[inline(always)]
+    fn entry(&mut self, at: usize) -> &mut i64 {
+        &mut self.entries.0[at & (ROOM - 1)]
     }
 
     /// Room for eight more.
     #[inline(always)]
     fn reserve(&mut self) {
         if self.len > ROOM - 8 {
-            self.spill();
+            spill(self.spilled, &self.entries.0[..self.len]);
+            self.len = 0;
         }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn spill(&mut self) {
-        self.spilled.extend_from_slice(&self.entries[..self.len]);
-        self.len = 0;
     }
 
     #[inline(always)]
     fn push(&mut self, entry: i64) {
-        self.entries[self.len & (ROOM - 1)] = entry;
+        *self.entry(self.len) = entry;
         self.len += 1;
     }
 
     #[inline(always)]
     fn push_if(&mut self, entry: i64, really: bool) {
-        self.entries[self.len & (ROOM - 1)] = entry;
+        *self.entry(self.len) = entry;
         self.len += usize::from(really);
     }
 
     /// The last entry.
     #[inline(always)]
     fn top(&mut self) -> &mut i64 {
-        &mut self.entries[(self.len - 1) & (ROOM - 1)]
+        self.entry(self.len - 1)
     }
 
     /// Pushes below all of the last `count` that are nearer.
     #[inline(always)]
     fn insert(&mut self, entry: i64, count: usize) {
         let mut at = self.len;
-        while at > self.len - count && self.entries[(at - 1) & (ROOM - 1)] < entry {
-            self.entries[at & (ROOM - 1)] = self.entries[(at - 1) & (ROOM - 1)];
+        while at > self.len - count && *self.entry(at - 1) < entry {
+            *self.entry(at) = *self.entry(at - 1);
             at -= 1;
         }
-        self.entries[at & (ROOM - 1)] = entry;
+        *self.entry(at) = entry;
         self.len += 1;
     }
 
@@ -76,8 +79,14 @@ impl Stack {
             return self.spilled.pop();
         }
         self.len -= 1;
-        Some(self.entries[self.len & (ROOM - 1)])
+        Some(*self.entry(self.len))
     }
+}
+
+#[cold]
+#[inline(never)]
+fn spill(to: &mut Vec<i64>, entries: &[i64]) {
+    to.extend_from_slice(entries);
 }
 
 #[inline(always)]
@@ -112,8 +121,13 @@ fn spread<S: Simd>(simd: S, v: &[f32; 4]) -> [f32x8<S>; 3] {
     [f32x8::splat(simd, v[0]), f32x8::splat(simd, v[1]), f32x8::splat(simd, v[2])]
 }
 
-/// The ray's constants in every lane.
-pub(crate) struct Lanes<S: Simd> {
+#[inline(always)]
+fn bits<S: Simd>(v: f32x8<S>) -> i32x8<S> {
+    v.bitcast()
+}
+
+/// The ray's constants in every lane. `FORWARD`: none of its t before zero matters, as [`LocalRay::new`] has it.
+pub(crate) struct Lanes<S: Simd, const FORWARD: bool> {
     inv: [f32x8<S>; 3],
     near_shift: [f32x8<S>; 3],
     far_shift: [f32x8<S>; 3],
@@ -123,7 +137,7 @@ pub(crate) struct Lanes<S: Simd> {
     far: [usize; 3],
 }
 
-impl<S: Simd> Lanes<S> {
+impl<S: Simd, const FORWARD: bool> Lanes<S, FORWARD> {
     #[inline(always)]
     pub(crate) fn new(simd: S, ray: &LocalRay) -> Self {
         Self {
@@ -149,8 +163,15 @@ impl<S: Simd> Lanes<S> {
         let exit_x = far_x.mul_add(inv[0], far[0]);
         let exit_y = far_y.mul_add(inv[1], far[1]);
         let exit_z = far_z.mul_add(inv[2], far[2]);
+        let t_max = f32x8::splat(simd, t_max);
+        if FORWARD {
+            // As integers, which takes a quarter of the time: ends of boxes that matter are not below zero, and apart (§10).
+            let enter = bits(enter_x).max(bits(enter_y)).max(bits(enter_z).max(bits(self.t_min)));
+            let exit = bits(exit_x).min(bits(exit_y)).min(bits(exit_z).min(bits(t_max)));
+            return (enter.simd_lt(exit).to_bitmask() as u32, enter.bitcast());
+        }
         let enter = enter_x.max(enter_y).max(enter_z.max(self.t_min));
-        let exit = exit_x.min(exit_y).min(exit_z.min(f32x8::splat(simd, t_max)));
+        let exit = exit_x.min(exit_y).min(exit_z.min(t_max));
         // Certainly a miss only if it enters after it has left; none of the two is NaN (§10).
         (enter.simd_le(exit).to_bitmask() as u32, enter)
     }
@@ -170,9 +191,16 @@ pub(crate) trait Any<S: Simd> {
 
 /// Visits the leaves whose boxes `ray` meets before `t_max`, nearest first.
 #[inline(always)]
-pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: f32, leaves: &mut impl Closest<S>) {
+pub(crate) fn closest<S: Simd, const FORWARD: bool>(
+    simd: S,
+    tree: &Wide,
+    ray: &Lanes<S, FORWARD>,
+    mut t_max: f32,
+    leaves: &mut impl Closest<S>,
+) {
     let nodes = &tree.nodes[..];
-    let mut stack = Stack::new();
+    let (mut entries, mut spilled) = (Entries([0; ROOM]), Vec::new());
+    let mut stack = Stack::new(&mut entries, &mut spilled);
     let mut at = 0u32;
     loop {
         // Down to a leaf, or to nothing.
@@ -240,9 +268,16 @@ pub(crate) fn closest<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, mut t_max: 
 
 /// Visits the leaves whose boxes `ray` meets before `t_max`, in the nodes' fixed order, until one holds a hit.
 #[inline(always)]
-pub(crate) fn any<S: Simd>(simd: S, tree: &Wide, ray: &Lanes<S>, t_max: f32, leaves: &mut impl Any<S>) -> bool {
+pub(crate) fn any<S: Simd, const FORWARD: bool>(
+    simd: S,
+    tree: &Wide,
+    ray: &Lanes<S, FORWARD>,
+    t_max: f32,
+    leaves: &mut impl Any<S>,
+) -> bool {
     let nodes = &tree.nodes[..];
-    let mut stack = Stack::new();
+    let (mut entries, mut spilled) = (Entries([0; ROOM]), Vec::new());
+    let mut stack = Stack::new(&mut entries, &mut spilled);
     let mut at = 0u32;
     loop {
         while at & LEAF == 0 {

@@ -238,8 +238,9 @@ impl<M> Sides<M> {
     {
         let w = det - u - v;
         // Certainly a miss: one edge function above zero, another below. An empty lane has a negative margin.
-        let least = u.min(v.min(w));
-        let most = u.max(v.max(w));
+        // w last: it is what has to be waited for.
+        let least = u.min(v).min(w);
+        let most = u.max(v).max(w);
         let outside = (least.simd_lt(-margin) & most.simd_gt(margin)).to_bitmask() as u32;
         // Certainly through: all three above zero, or all below.
         let through = least.simd_gt(margin) | most.simd_lt(-margin);

@@ -74,20 +74,20 @@ impl<'a> Asked<'a> {
 fn closest_with<S: Simd>(simd: S, search: &mut Search) {
     let asked = &search.asked;
     match LocalRay::new(simd, asked.mesh.frame(), asked.ray, asked.within()) {
-        Some(local) => closest_along(simd, search, &local),
-        None => closest_from_afar(simd, search),
+        Some(local) => closest_along::<S, true>(simd, search, &local),
+        None => closest_uncommon(simd, search),
     }
 }
 
 #[inline(never)]
-fn closest_from_afar<S: Simd>(simd: S, search: &mut Search) {
+fn closest_uncommon<S: Simd>(simd: S, search: &mut Search) {
     simd.vectorize(
         #[inline(always)]
         move || {
             let &Asked { ray, mesh, .. } = &search.asked;
             let within = search.asked.within();
-            match LocalRay::from_afar(simd, mesh.frame(), ray, within) {
-                Some(local) => closest_along(simd, search, &local),
+            match LocalRay::uncommon(simd, mesh.frame(), ray, within) {
+                Some(local) => closest_along::<S, false>(simd, search, &local),
                 None => *search.hit = closest_of_all(mesh, ray, within),
             }
         },
@@ -95,13 +95,13 @@ fn closest_from_afar<S: Simd>(simd: S, search: &mut Search) {
 }
 
 #[inline(always)]
-fn closest_along<S: Simd>(simd: S, search: &mut Search, local: &LocalRay) {
+fn closest_along<S: Simd, const FORWARD: bool>(simd: S, search: &mut Search, local: &LocalRay) {
     let &Asked { ray, mesh, .. } = &search.asked;
     let mut walk = Single {
         probe: Probe::new(local, mesh.exact),
         nearest: Nearest::new(mesh, ray, search.asked.within(), local.limits, local.sure, local.t_max),
     };
-    bvh::closest(simd, &mesh.tree, &Lanes::new(simd, local), local.t_max, &mut walk);
+    bvh::closest(simd, &mesh.tree, &Lanes::<S, FORWARD>::new(simd, local), local.t_max, &mut walk);
     walk.nearest.settle(simd, search.hit);
 }
 
@@ -121,27 +121,27 @@ fn any_apart<S: Simd>(simd: S, asked: &Asked) -> bool {
 #[inline(always)]
 fn any_with<S: Simd>(simd: S, asked: &Asked) -> bool {
     match LocalRay::new(simd, asked.mesh.frame(), asked.ray, asked.within()) {
-        Some(local) => any_along(simd, asked, &local),
-        None => any_from_afar(simd, asked),
+        Some(local) => any_along::<S, true>(simd, asked, &local),
+        None => any_uncommon(simd, asked),
     }
 }
 
 #[inline(never)]
-fn any_from_afar<S: Simd>(simd: S, asked: &Asked) -> bool {
+fn any_uncommon<S: Simd>(simd: S, asked: &Asked) -> bool {
     simd.vectorize(
         #[inline(always)]
-        move || match LocalRay::from_afar(simd, asked.mesh.frame(), asked.ray, asked.within()) {
-            Some(local) => any_along(simd, asked, &local),
+        move || match LocalRay::uncommon(simd, asked.mesh.frame(), asked.ray, asked.within()) {
+            Some(local) => any_along::<S, false>(simd, asked, &local),
             None => closest_of_all(asked.mesh, asked.ray, asked.within()).is_some(),
         },
     )
 }
 
 #[inline(always)]
-fn any_along<S: Simd>(simd: S, asked: &Asked, local: &LocalRay) -> bool {
+fn any_along<S: Simd, const FORWARD: bool>(simd: S, asked: &Asked, local: &LocalRay) -> bool {
     let &Asked { ray, mesh, .. } = asked;
     let mut first = First { mesh, ray, within: asked.within(), local, probe: Probe::new(local, mesh.exact) };
-    bvh::any(simd, &mesh.tree, &Lanes::new(simd, local), local.t_max, &mut first)
+    bvh::any(simd, &mesh.tree, &Lanes::<S, FORWARD>::new(simd, local), local.t_max, &mut first)
 }
 
 /// A ray that has no place in the tree's frame.
