@@ -2,11 +2,11 @@
 
 use crate::kernel::bound::{INFLATE, U};
 use crate::kernel::eft::{two_diff, two_sum};
-use crate::kernel::float::{exponent_of, ldexp, length, power, unit};
-use crate::kernel::map::{Image, Map, Unusable, inverse, taxicab, transform_point};
+use crate::kernel::float::{length, power, unit};
+use crate::kernel::map::{Image, Map, Unusable, inverse, largest_stretch, taxicab, transform_point};
 use crate::kernel::tally;
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint, Tangent};
-use glam::{DAffine3, DMat3, DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 
 /// `shape` moved, turned, scaled, mirrored or sheared by an affine map.
 ///
@@ -105,17 +105,6 @@ fn refused(why: Unusable) -> InvalidShape {
         Unusable::Singular => InvalidShape::Singular { field: FIELD },
         Unusable::OutOfRange => InvalidShape::OutOfRange { field: FIELD, value: f64::INFINITY },
     }
-}
-
-/// At least |Mv|/|v| for every v, exact but for rounding where M turns and scales along its own axes: ‖M‖² is at most the
-/// largest absolute row sum of MᵀM.
-fn largest_stretch(m: &DMat3) -> f64 {
-    let largest = m.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs()));
-    let k = -exponent_of(largest);
-    let m = DMat3::from_cols_array(&m.to_cols_array().map(|x| ldexp(x, k)));
-    let gram = m.transpose() * m;
-    let rows = gram.x_axis.abs() + gram.y_axis.abs() + gram.z_axis.abs();
-    ldexp((rows.max_element() * (1.0 + 64.0 * U)).sqrt() * (1.0 + 4.0 * U), -k)
 }
 
 /// λ of the exact image is at most this many times further from that of the rounded one than the point moves, in lengths

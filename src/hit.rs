@@ -11,7 +11,7 @@ use glam::DVec2;
 pub struct Hit {
     /// The hit is at `origin + lambda · direction`.
     pub lambda: f64,
-    /// |`lambda` − exact λ| ≤ `error`.
+    /// |`lambda` − exact λ| ≤ `error`; infinite where λ is beyond the range of floats, and then ±[`f64::MAX`].
     pub error: f64,
     /// Surface coordinates where they come with the intersection: a triangle's second and third barycentric weight;
     /// zero for shapes that work them out from the point.

@@ -204,6 +204,27 @@ fn a_chain_costs_what_one_map_does() {
     }
 }
 
+/// What a chain leaves unknown grows with its length, not by a factor a link.
+#[test]
+fn long_chains_keep_their_bound() {
+    let shift = DAffine3::from_translation(DVec3::splat(1.0 / 1024.0));
+    let turn = DAffine3::from_rotation_translation(DQuat::from_rotation_y(0.3), DVec3::new(0.01, 0.0, -0.01));
+    for (name, map) in [("shifts", shift), ("turns", turn)] {
+        let (mut whole, mut chain): (_, Box<dyn Shape>) = (DAffine3::IDENTITY, Box::new(Sphere::UNIT));
+        for link in 1..=500 {
+            chain = Box::new(Affine::new(chain, map).unwrap());
+            whole = map * whole;
+            if link % 100 == 0 {
+                let from = whole.translation + DVec3::new(0.0, 0.3, 3.0);
+                let ray = Ray::new(from, DVec3::new(0.0, 0.0, -1.0));
+                let Hit { lambda, error, .. } = chain.intersect(&ray, Interval::FORWARD).unwrap();
+                println!("{link} {name}: λ {lambda} ± {error:e}");
+                assert!((lambda - (3.0 - 0.91f64.sqrt())).abs() < 1e-10 && error < 2e-15, "{link} {name}: {error:e}");
+            }
+        }
+    }
+}
+
 /// Twenty turns by 18 degrees are one full turn: the box is that of the shape itself, not twenty boxes around boxes.
 #[test]
 fn a_chains_box_is_tight() {

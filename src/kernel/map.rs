@@ -7,7 +7,7 @@ use super::bounded::Bounded;
 use super::cpu::{self, FusedLanes};
 use super::dyadic::Dyadic;
 use super::eft::{Fused, Product, Split, two_sum};
-use super::float::power;
+use super::float::{exponent_of, ldexp, power};
 use super::lanes::{Lanes, Plain};
 use super::number::{Number, Vector, cross, dot, vector};
 use super::ratio::Ratio;
@@ -26,7 +26,7 @@ pub struct Map {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Rest {
     low: DAffine3,
-    /// How far the sums may be off an entry of the exact chain: of its matrix, of its translation.
+    /// How far the sums may be off the exact chain: a row of its matrix, by length, and an entry of its translation.
     errors: [f64; 2],
 }
 
@@ -204,8 +204,9 @@ impl Map {
         let [matrix, shift] = self.rest.as_ref().map_or([0.0; 2], |rest| rest.errors);
         let translation = leading.translation.abs().max_element();
         let errors = [
-            3.1 * matrix * largest(&first.matrix3) + rounding(largest(&leading.matrix3)),
-            1.1 * matrix * taxicab(first.translation) + 1.1 * shift + rounding(translation),
+            // Rows by their lengths, so that turns and shifts let the error grow by no more than their own; 2 > √3.
+            matrix * largest_stretch(&first.matrix3) * INFLATE + 2.0 * rounding(largest(&leading.matrix3)),
+            (matrix * taxicab(first.translation) + shift) * INFLATE + rounding(translation),
         ];
         Ok(Self { leading, rest: Some(Box::new(Rest { low, errors })) })
     }
@@ -457,6 +458,17 @@ pub(crate) fn transform_point(map: &DAffine3, p: DVec3) -> DVec3 {
         #[inline(always)]
         || with::<Plain>((), map, p),
     )
+}
+
+/// At least |Mv|/|v| for every v, exact but for rounding where M turns and scales along its own axes: ‖M‖² is at most the
+/// largest absolute row sum of MᵀM.
+pub(crate) fn largest_stretch(m: &DMat3) -> f64 {
+    let largest = m.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+    let k = -exponent_of(largest);
+    let m = DMat3::from_cols_array(&m.to_cols_array().map(|x| ldexp(x, k)));
+    let gram = m.transpose() * m;
+    let rows = gram.x_axis.abs() + gram.y_axis.abs() + gram.z_axis.abs();
+    ldexp((rows.max_element() * (1.0 + 64.0 * U)).sqrt() * (1.0 + 4.0 * U), -k)
 }
 
 /// |v|₁ ≥ |v|.
