@@ -39,8 +39,7 @@ impl Aabb {
             // One rounding of the entry, one of the product, three of the sum; the rest is for this line.
             let off = size * (4.0 * f64::EPSILON) + DVec3::splat(f64::MIN_POSITIVE);
             let image = m * *p + t;
-            let image = Self { min: image - off, max: image + off };
-            b.union(if image.min.is_nan() || image.max.is_nan() { Self::EVERYTHING } else { image })
+            b.union(Self { min: image - off, max: image + off }.or_everything())
         })
     }
 
@@ -63,7 +62,12 @@ impl Aabb {
         let (z, w) = (m.z_axis * self.min.z, m.z_axis * self.max.z);
         let image =
             Self { min: x.min(u) + y.min(v) + z.min(w) + t - off, max: x.max(u) + y.max(v) + z.max(w) + t + off };
-        if image.min.is_nan() || image.max.is_nan() { Self::EVERYTHING } else { image }
+        image.or_everything()
+    }
+
+    /// Everything instead of what overflow has left unknown.
+    fn or_everything(self) -> Self {
+        if self.min.is_nan() || self.max.is_nan() { Self::EVERYTHING } else { self }
     }
 
     /// The smallest box around both.

@@ -177,6 +177,7 @@ fn answered_alike(mesh: &mut Mesh, rays: &[(Ray, Interval)]) -> usize {
             let alone = mesh.intersect(ray, *within);
             assert_eq!(hits[i], alone, "{level}: ray {i}, {ray:?} {within:?}");
             assert_eq!(occluded[i], alone.is_some(), "{level}: ray {i}, {ray:?} {within:?}");
+            assert_eq!(mesh.occludes(ray, *within), alone.is_some(), "{level}: ray {i}, {ray:?} {within:?}");
         }
     }
     hits.iter().flatten().count()
@@ -304,6 +305,56 @@ fn slices_do_not_leak() {
     }
     println!("{asked} rays, 0 leaks");
     assert!(asked > 1_000_000);
+}
+
+/// Rays that start on a face of a box, or leave it there, with limits next to zero and next to the hit.
+#[test]
+fn limits_next_to_zero_and_to_the_hit_lose_nothing() {
+    let (mut asked, mut hits) = (0, 0);
+    let tiny = f64::from_bits(1);
+    for size in [1.0, 3.0, 1e-9, 1e12] {
+        // A cube's faces, so that boxes have triangles in their faces, and the rays' origins lie in them too.
+        let (positions, triangles) = grid_cube(4);
+        let mut mesh = Mesh::new(positions.iter().map(|p| size * *p).collect(), triangles).unwrap();
+        let bounds = mesh.bounds();
+        let (low, high) = (bounds.min, bounds.max);
+        for (axis, unit) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
+            for side in [-1.0, 1.0] {
+                for at in [0.0, 0.25, 0.3, 0.5, 1.0] {
+                    for step in [0.0, tiny, 1e-300, 1e-30, 1e-9, 0.5, 1.0, 2.0] {
+                        let mut origin = low + at * (high - low);
+                        origin[axis] = if side > 0.0 { low[axis] } else { high[axis] };
+                        let toward = side * unit * size;
+                        // Before, on, and behind the face that it starts at.
+                        for origin in [origin - step * toward, origin, origin + step * toward] {
+                            let ray = Ray::new(origin, toward);
+                            for min in [-0.0, 0.0, tiny, 1e-300] {
+                                for max in
+                                    [tiny, 1e-300, step, step.next_up(), 1.0, 4.0, 4.0f64.next_up(), f64::INFINITY]
+                                {
+                                    let within = Interval::new(min, max);
+                                    let truth = brute_force(&mesh, &ray, within);
+                                    for (level, simd) in Level::all() {
+                                        mesh.set_level(simd);
+                                        assert_eq!(mesh.intersect(&ray, within), truth, "{level}: {ray:?} {within:?}");
+                                        assert_eq!(
+                                            mesh.occludes(&ray, within),
+                                            truth.is_some(),
+                                            "{level}: {ray:?} {within:?}"
+                                        );
+                                    }
+                                    asked += 1;
+                                    hits += usize::from(truth.is_some());
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+    println!("{hits} hits of {asked}");
+    assert!(hits > asked / 4 && hits < asked);
 }
 
 /// Small triangles in a mesh 2⁴⁰ times as large, unit directions: in f32 the products of edges and direction vanish.

@@ -11,7 +11,9 @@ use support::rng::Rng;
 use support::shapes::shape;
 use truehit::glam::{DVec2, DVec3};
 use truehit::kernel::frustum::{BASE, TOP, WALL};
-use truehit::{Cone, Cylinder, Interval, InvalidShape, Patch, Ray, Scene, Shape, Sphere, Surface, Tangent};
+use truehit::{
+    Cone, Cylinder, Interval, InvalidShape, Patch, Ray, Scene, Shape, Sphere, Surface, SurfacePoint, Tangent,
+};
 
 fn any_shape(rng: &mut Rng) -> Box<dyn Shape> {
     let (p, axis) = (rng.in_cube(5.0), rng.unit() * rng.log(0.1, 10.0));
@@ -190,7 +192,8 @@ fn wafers_far_out_keep_their_direction() {
                 let b = shape.bounds();
                 assert_eq!((b.min, b.max), (DVec3::new(0.5 * far, b.min.y, -r), DVec3::new(1.5 * far, b.max.y, r)));
                 let hit = shape.intersect(&ray, Interval::FORWARD).unwrap();
-                let (position, normal) = (shape.point(&ray, &hit).position, shape.normal(&ray, &hit));
+                let (SurfacePoint { position, error }, normal) = (shape.point(&ray, &hit), shape.normal(&ray, &hit));
+                assert!(error < 1e-14 * far, "{error}");
                 assert!(((position - DVec3::new(far, 0.0, 0.2 * far)) / far).length() < 1e-15, "{position}");
                 assert_eq!(normal, DVec3::new(0.0, -flip, 0.0));
                 let uv = shape.texture_coordinates(&ray, &hit);
@@ -233,6 +236,14 @@ fn needles_and_wafers_of_any_size_have_points_in_their_boxes() {
     }
     println!("{hits} hits");
     assert!(hits > 4_000);
+}
+
+#[test]
+fn thin_walls_keep_their_height() {
+    let can = Cylinder::new([0.0; 3], [0.0, 0.0, 1e-200], 1e100).unwrap();
+    let ray = Ray::new([2e100, 0.0, 2.5e-201], [-1.0, 0.0, 0.0]);
+    let hit = can.intersect(&ray, Interval::FORWARD).unwrap();
+    assert!(hit.part == WALL && (can.texture_coordinates(&ray, &hit).y - 0.25).abs() < 1e-15);
 }
 
 #[test]

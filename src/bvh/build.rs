@@ -251,6 +251,7 @@ impl Builder<'_, '_> {
         let (l, r) = if n >= PARALLEL && tasks::are_parallel() {
             let mut others = Vec::with_capacity(upper.len());
             let (l, r) = tasks::join(
+                // As was just asked.
                 true,
                 || self.subdivide(lower, nodes, left, left_at),
                 || self.subdivide(upper, &mut others, right, right_at),

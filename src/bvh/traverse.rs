@@ -9,8 +9,7 @@ use fearless_simd::{Simd, f32x8, i32x8, prelude::*};
 
 /// What is left to visit, each with the t where its box begins in the highest bits. As signed integers they sort as t does, but for
 /// negative ones among themselves: boxes that the ray starts in come first. Kept in a fixed array; what does not fit,
-/// which no sensible tree needs, goes to the heap.
-/// The two memories are elsewhere, so that the length stays in a register.
+/// which no sensible tree needs, goes to the heap. Array and heap are the caller's, so that the length stays in a register.
 struct Stack<'a> {
     entries: &'a mut Entries,
     len: usize,
@@ -30,7 +29,7 @@ impl<'a> Stack<'a> {
     }
 
     #[inline(always)]
-    fn entry(&mut self, at: usize) -> &mut i64 {
+    fn slot(&mut self, at: usize) -> &mut i64 {
         &mut self.entries.0[at & (ROOM - 1)]
     }
 
@@ -45,31 +44,31 @@ impl<'a> Stack<'a> {
 
     #[inline(always)]
     fn push(&mut self, entry: i64) {
-        *self.entry(self.len) = entry;
+        *self.slot(self.len) = entry;
         self.len += 1;
     }
 
     #[inline(always)]
     fn push_if(&mut self, entry: i64, really: bool) {
-        *self.entry(self.len) = entry;
+        *self.slot(self.len) = entry;
         self.len += usize::from(really);
     }
 
     /// The last entry.
     #[inline(always)]
     fn top(&mut self) -> &mut i64 {
-        self.entry(self.len - 1)
+        self.slot(self.len - 1)
     }
 
     /// Pushes below all of the last `count` that are nearer.
     #[inline(always)]
     fn insert(&mut self, entry: i64, count: usize) {
         let mut at = self.len;
-        while at > self.len - count && *self.entry(at - 1) < entry {
-            *self.entry(at) = *self.entry(at - 1);
+        while at > self.len - count && *self.slot(at - 1) < entry {
+            *self.slot(at) = *self.slot(at - 1);
             at -= 1;
         }
-        *self.entry(at) = entry;
+        *self.slot(at) = entry;
         self.len += 1;
     }
 
@@ -79,7 +78,7 @@ impl<'a> Stack<'a> {
             return self.spilled.pop();
         }
         self.len -= 1;
-        Some(*self.entry(self.len))
+        Some(*self.slot(self.len))
     }
 }
 
@@ -140,6 +139,7 @@ pub(crate) struct Lanes<S: Simd, const FORWARD: bool> {
 impl<S: Simd, const FORWARD: bool> Lanes<S, FORWARD> {
     #[inline(always)]
     pub(crate) fn new(simd: S, ray: &LocalRay) -> Self {
+        debug_assert!(!FORWARD || ray.t_min.is_sign_positive(), "the integers sort as the floats do");
         Self {
             inv: spread(simd, &ray.inv),
             near_shift: spread(simd, &ray.near_shift),
@@ -165,7 +165,7 @@ impl<S: Simd, const FORWARD: bool> Lanes<S, FORWARD> {
         let exit_z = far_z.mul_add(inv[2], far[2]);
         let t_max = f32x8::splat(simd, t_max);
         if FORWARD {
-            // As integers, which takes a quarter of the time: ends of boxes that matter are not below zero, and apart (§10).
+            // As integers, where AVX has them a quarter of the time: of a box that matters every exit is above zero, and above every entry (§10).
             let enter = bits(enter_x).max(bits(enter_y)).max(bits(enter_z).max(bits(self.t_min)));
             let exit = bits(exit_x).min(bits(exit_y)).min(bits(exit_z).min(bits(t_max)));
             return (enter.simd_lt(exit).to_bitmask() as u32, enter.bitcast());

@@ -47,7 +47,7 @@ pub const fn power(e: i32) -> f64 {
     f64::from_bits(((e + 1023) as u64) << 52)
 }
 
-/// Squares of numbers beyond these might leave the range.
+/// Whether squares of such numbers, and sums of a few, stay in range.
 fn has_squares(x: f64) -> bool {
     x > power(-400) && x < power(400)
 }

@@ -201,13 +201,13 @@ impl Map {
         // Two floats hold a number to 2⁻¹⁰⁴ of itself, or to a few of the smallest; what this map did not know is multiplied.
         let rounding = |largest: f64| 4.0 * U * U * largest + f64::from_bits(4);
         let largest = |m: &DMat3| m.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs()));
-        let [matrix, shift] = self.rest.as_ref().map_or([0.0; 2], |rest| rest.errors);
         let translation = leading.translation.abs().max_element();
-        let errors = [
-            // Rows by their lengths, so that turns and shifts let the error grow by no more than their own; 2 > √3.
-            matrix * largest_stretch(&first.matrix3) * INFLATE + 2.0 * rounding(largest(&leading.matrix3)),
-            (matrix * taxicab(first.translation) + shift) * INFLATE + rounding(translation),
-        ];
+        // Rows by their lengths, so that turns and shifts let the error grow by no more than their own; 2 > √3.
+        let mut errors = [2.0 * rounding(largest(&leading.matrix3)), rounding(translation)];
+        if let Some(Rest { errors: [matrix, shift], .. }) = self.rest.as_deref() {
+            errors[0] += matrix * largest_stretch(&first.matrix3) * INFLATE;
+            errors[1] += (matrix * taxicab(first.translation) + shift) * INFLATE;
+        }
         Ok(Self { leading, rest: Some(Box::new(Rest { low, errors })) })
     }
 

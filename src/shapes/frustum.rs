@@ -24,7 +24,7 @@ const SHARP: f64 = 1.0 / (1u64 << 40) as f64;
 /// are met with their own rounding only.
 struct Foot {
     local: Local,
-    /// top − base.
+    /// top − base; longer, where scaling would have left nothing of it.
     axis: DVec3,
     end: DVec3,
     /// From the base 0 to 1, from the top −1 to 0.
@@ -77,18 +77,24 @@ impl Frustum {
         frustum::precise_lambda(ray, self.base, self.top, self.base_radius, self.top_radius, hit.lambda)
     }
 
-    /// From base to top, a unit vector. The difference comes first: scaled like its ends, a short axis far out would vanish.
-    fn direction(&self) -> DVec3 {
+    /// From base to top, over the number beside it: two where the difference overflows, else one. Scaled before that like its ends,
+    /// a short axis far out would vanish.
+    fn axis(&self) -> (DVec3, f64) {
         let v = self.top - self.base;
-        let v = if v.is_finite() { v } else { 0.5 * self.top - 0.5 * self.base };
-        unit(v).expect("two ends")
+        if v.is_finite() { (v, 1.0) } else { (0.5 * self.top - 0.5 * self.base, 2.0) }
+    }
+
+    /// From base to top, a unit vector.
+    fn direction(&self) -> DVec3 {
+        unit(self.axis().0).expect("two ends")
     }
 
     fn foot(&self, ray: &Ray, hit: &Hit) -> Foot {
         let extent = self.base.abs().max(self.top.abs()).max(ray.origin.abs()).max_element();
         let local = Local::new(extent.max(self.base_radius).max(self.top_radius));
-        let (r0, r1) = (local.length(self.base_radius), local.length(self.top_radius));
-        let axis = local.vector(self.top) - local.vector(self.base);
+        let (r0, r1) = (local.inside(self.base_radius), local.inside(self.top_radius));
+        let (axis, times) = self.axis();
+        let axis = local.vector(axis) * times;
         let axis = if axis.abs().max_element() < local.lost() { local.lost() * self.direction() } else { axis };
         let foot = |lambda| {
             let from_base = local.offset(ray, lambda, self.base);
@@ -107,7 +113,7 @@ impl Frustum {
             Foot { local, axis, end, along: at, height, radial, radius: r + at * (r1 - r0) }
         };
         let rough = foot([hit.lambda, 0.0]);
-        let moved = local.length(hit.error * length(ray.direction));
+        let moved = local.inside(hit.error * length(ray.direction));
         if moved <= SHARP * rough.radius { rough } else { foot(self.precise_lambda(ray, hit)) }
     }
 
@@ -126,7 +132,7 @@ impl Frustum {
 
     /// cos·radial − sin·axis, with tan = Δr/height. At an apex, where no radial direction is left, along the axis.
     fn wall_normal(&self, f: &Foot, axis: DVec3, ray: &Ray) -> DVec3 {
-        let growth = f.local.length(self.top_radius - self.base_radius);
+        let growth = f.local.inside(self.top_radius - self.base_radius);
         let Some(radial) = unit(f.radial) else {
             if growth != 0.0 {
                 return -axis * growth.signum();
@@ -140,7 +146,7 @@ impl Frustum {
 
     pub(super) fn point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let f = self.foot(ray, hit);
-        let (r0, r1) = (f.local.length(self.base_radius), f.local.length(self.top_radius));
+        let (r0, r1) = (f.local.inside(self.base_radius), f.local.inside(self.top_radius));
         let clamped = |r: f64| {
             let from_axis = length(f.radial);
             if from_axis <= r { f.radial } else { r * unit(f.radial).unwrap_or(DVec3::ZERO) }
@@ -156,11 +162,11 @@ impl Frustum {
         let radial = f.local.vector_outside(radial);
         let position = foot + radial;
         // docs/numerics.md §6: radial direction and its length, the foot, and the two sums.
-        let sizes = 12.0 * self.base_radius.max(self.top_radius)
-            + 6.0 * f.local.outside(length(f.axis))
-            + 2.0 * length(foot)
-            + 2.0 * length(position);
-        SurfacePoint { position, error: U * sizes + f.local.outside(f.local.lost()) + f64::from_bits(16) }
+        let rounding = 12.0 * U * self.base_radius.max(self.top_radius)
+            + 6.0 * U * f.local.outside(length(f.axis))
+            + 2.0 * length(U * foot)
+            + 2.0 * length(U * position);
+        SurfacePoint { position, error: rounding + f.local.outside(f.local.lost()) + f64::from_bits(16) }
     }
 
     /// The box around both caps' circles: a circle of radius r across unit axis a reaches r·√(1 − aᵢ²) along i.
@@ -189,7 +195,7 @@ impl Frustum {
         let (e1, e2) = self.direction().any_orthonormal_pair();
         let (x, y) = (f.radial.dot(e1), f.radial.dot(e2));
         let planar = |r: f64| {
-            let r = f.local.length(r);
+            let r = f.local.inside(r);
             DVec2::new(0.5 + 0.5 * x / r, 0.5 + 0.5 * y / r).clamp(DVec2::ZERO, DVec2::ONE)
         };
         match hit.part {

@@ -21,13 +21,13 @@ impl Local {
     }
 
     /// A length in local units.
-    pub(super) fn length(self, x: f64) -> f64 {
+    pub(super) fn inside(self, x: f64) -> f64 {
         scaled(x, -self.exponent)
     }
 
     /// A vector in local units.
     pub(super) fn vector(self, v: DVec3) -> DVec3 {
-        if self.exponent == 0 { v } else { v.map(|x| self.length(x)) }
+        if self.exponent == 0 { v } else { v.map(|x| self.inside(x)) }
     }
 
     /// A local length outside.
@@ -40,9 +40,9 @@ impl Local {
         if self.exponent == 0 { v } else { v.map(|x| self.outside(x)) }
     }
 
-    /// More than a scaled vector may have lost, in local units; shorter ones have no digits of their own.
+    /// What is shorter may have lost digits when it was scaled, in local units.
     pub(super) fn lost(self) -> f64 {
-        if self.exponent == 0 { 0.0 } else { power(-900) }
+        if self.exponent == 0 { 0.0 } else { power(-1000) }
     }
 
     /// origin + (λ₀ + λ₁)·direction − `from`, rounded once or twice: the parts that cancel do so exactly.

@@ -118,7 +118,7 @@ impl Shape for Sphere {
         let position = self.center + self.radius * normal;
         // The normal's length is off by less than 4u, so the product by less than 5u·r, and the sum by u of itself;
         // the last term is for subnormal results.
-        let error = U * (6.0 * self.radius + 2.0 * length(position)) + f64::from_bits(8);
+        let error = 6.0 * U * self.radius + 2.0 * length(U * position) + f64::from_bits(8);
         SurfacePoint { position, error }
     }
 

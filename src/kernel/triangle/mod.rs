@@ -525,8 +525,8 @@ pub fn point(ray: &Ray, vertices: &[DVec3; 3], uv: DVec2) -> (DVec3, f64) {
     let (f, g) = (uv.x * (b - a), uv.y * (c - a));
     let position = a + (f + g);
     // Each of b−a, its multiple and their sum is rounded, then the sum with a; underflow is below the last place.
-    let off = 3.0 * (f.abs() + g.abs()) + position.abs();
-    (position, U * length(off) * (1.0 + 8.0 * U) + f64::MIN_POSITIVE)
+    let off = 3.0 * U * (f.abs() + g.abs()) + U * position.abs();
+    (position, length(off) * (1.0 + 8.0 * U) + f64::MIN_POSITIVE)
 }
 
 /// On which side of the triangle's plane `point` lies, exactly: the sign of n·(point − a), n = (b−a)×(c−a).
