@@ -3,7 +3,8 @@
 use crate::kernel::bound::{INFLATE, U};
 use crate::kernel::eft::{two_diff, two_sum};
 use crate::kernel::float::{length, power, unit};
-use crate::kernel::map::{Image, Map, Unusable, inverse, largest_stretch, taxicab, transform_point};
+use crate::kernel::map::{Image, Map, Unusable, inverse, transform_point};
+use crate::kernel::norm::{largest_stretch, taxicab};
 use crate::kernel::tally;
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint, Tangent};
 use glam::{DAffine3, DVec2, DVec3};
@@ -72,7 +73,7 @@ impl<S: Shape> Affine<S> {
     ///
     /// Each component x is off the exact image's by at most u·|x| + 48u²·P with u = 2⁻⁵³ and P the sum of absolute values
     /// of the products that x is made of: half a unit in the last place, unless the maps all but cancel it. In a chain, each
-    /// map's product with the others adds 8u² of its own.
+    /// further map may add 8u² of the product's largest entry to an entry.
     #[must_use]
     pub fn object_ray(&self, world_ray: &Ray) -> Ray {
         self.image(world_ray).ray

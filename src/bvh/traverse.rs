@@ -165,7 +165,8 @@ impl<S: Simd, const FORWARD: bool> Lanes<S, FORWARD> {
         let exit_z = far_z.mul_add(inv[2], far[2]);
         let t_max = f32x8::splat(simd, t_max);
         if FORWARD {
-            // As integers, where AVX has them a quarter of the time: of a box that matters every exit is above zero, and above every entry (§10).
+            // As integers, which AVX2 compares in a quarter of the time: of a box that matters every exit is above zero,
+            // and above every entry (§10).
             let enter = bits(enter_x).max(bits(enter_y)).max(bits(enter_z).max(bits(self.t_min)));
             let exit = bits(exit_x).min(bits(exit_y)).min(bits(exit_z).min(bits(t_max)));
             return (enter.simd_lt(exit).to_bitmask() as u32, enter.bitcast());

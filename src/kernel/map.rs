@@ -7,8 +7,9 @@ use super::bounded::Bounded;
 use super::cpu::{self, FusedLanes};
 use super::dyadic::Dyadic;
 use super::eft::{Fused, Product, Split, two_sum};
-use super::float::{exponent_of, ldexp, power};
+use super::float::power;
 use super::lanes::{Lanes, Plain};
+use super::norm::{largest_stretch, taxicab};
 use super::number::{Number, Vector, cross, dot, vector};
 use super::ratio::Ratio;
 use super::tally;
@@ -458,23 +459,6 @@ pub(crate) fn transform_point(map: &DAffine3, p: DVec3) -> DVec3 {
         #[inline(always)]
         || with::<Plain>((), map, p),
     )
-}
-
-/// At least |Mv|/|v| for every v, exact but for rounding where M turns and scales along its own axes: ‖M‖² is at most the
-/// largest absolute row sum of MᵀM.
-pub(crate) fn largest_stretch(m: &DMat3) -> f64 {
-    let largest = m.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs()));
-    let k = -exponent_of(largest);
-    let m = DMat3::from_cols_array(&m.to_cols_array().map(|x| ldexp(x, k)));
-    let gram = m.transpose() * m;
-    let rows = gram.x_axis.abs() + gram.y_axis.abs() + gram.z_axis.abs();
-    ldexp((rows.max_element() * (1.0 + 64.0 * U)).sqrt() * (1.0 + 4.0 * U), -k)
-}
-
-/// |v|₁ ≥ |v|.
-#[inline(always)]
-pub(crate) fn taxicab(v: DVec3) -> f64 {
-    v.abs().element_sum()
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ pub mod float;
 pub mod frustum;
 pub mod lanes;
 pub mod map;
+pub(crate) mod norm;
 pub mod number;
 mod pair;
 pub mod plane;

@@ -77,8 +77,8 @@ impl Frustum {
         frustum::precise_lambda(ray, self.base, self.top, self.base_radius, self.top_radius, hit.lambda)
     }
 
-    /// From base to top, over the number beside it: two where the difference overflows, else one. Scaled before that like its ends,
-    /// a short axis far out would vanish.
+    /// From base to top, as a vector and its factor: two where the difference overflows, else one. Subtracted before anything is scaled,
+    /// or a short axis far out would vanish.
     fn axis(&self) -> (DVec3, f64) {
         let v = self.top - self.base;
         if v.is_finite() { (v, 1.0) } else { (0.5 * self.top - 0.5 * self.base, 2.0) }
