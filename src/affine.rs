@@ -147,6 +147,34 @@ impl<S: Shape> Affine<S> {
         unit(self.across(object_normal)).unwrap_or(object_normal)
     }
 
+    /// A point of the object, where its surface has this curvature and |Mᵀn| is `shrunk`.
+    fn world_point(&self, object: SurfacePoint, curvature: f64, shrunk: f64) -> SurfacePoint {
+        let SurfacePoint { position, error } = object;
+        let world = transform_point(&self.world_from_innermost, position);
+        let (w, t) = (self.world_from_innermost.matrix3, self.world_from_innermost.translation);
+        // The map's entries are rounded, and so is the sum.
+        let size =
+            w.x_axis.abs() * position.x.abs() + w.y_axis.abs() * position.y.abs() + w.z_axis.abs() * position.z.abs();
+        let rounding = U * (taxicab(world) + 2.0 * taxicab(size + t.abs()));
+        // An object-space error ε is at most ‖W‖ε here; along the normal, where it lies, it is ε/|Mᵀn|.
+        let stretched = error * largest_stretch(&w);
+        let along = 1.01 * error / shrunk;
+        let bends = self.curved(curvature, shrunk) * along;
+        let off = if bends < 0.005 && along < stretched { along } else { stretched };
+        SurfacePoint { position: world, error: (off + rounding) * INFLATE }
+    }
+
+    /// `object`'s tangent plane; `across` is Mᵀn, of length `shrunk`.
+    fn world_tangent(&self, object: &Tangent, across: DVec3, shrunk: f64) -> Tangent {
+        // |δ(Mᵀn)| ≤ ‖M‖(|δn| + a few u); of it only what is across Mᵀn turns the unit vector.
+        let turned = 1.01 * (object.normal_error + 8.0 * U) * (self.norm() / shrunk);
+        Tangent {
+            normal: unit(across).unwrap_or(object.normal),
+            normal_error: turned + 8.0 * U,
+            curvature: self.curved(object.curvature, shrunk),
+        }
+    }
+
     /// How far λ of `hit` moves from the rounded image to the exact one, and a bound on how far that is off.
     ///
     /// With e = o_lo + λ·d_lo the first order is Δ = −n·e/n·d; what it leaves out is bounded by what is not known of e, n
@@ -320,22 +348,18 @@ impl<S: Shape> Shape for Affine<S> {
     }
 
     fn point(&self, world_ray: &Ray, hit: &Hit) -> SurfacePoint {
-        let object_ray = self.object_ray(world_ray);
-        let SurfacePoint { position, error } = self.innermost().point(&object_ray, hit);
-        let world = transform_point(&self.world_from_innermost, position);
-        let (w, t) = (self.world_from_innermost.matrix3, self.world_from_innermost.translation);
-        // The map's entries are rounded, and so is the sum.
-        let size =
-            w.x_axis.abs() * position.x.abs() + w.y_axis.abs() * position.y.abs() + w.z_axis.abs() * position.z.abs();
-        let rounding = U * (taxicab(world) + 2.0 * taxicab(size + t.abs()));
-        // An object-space error ε is at most ‖W‖ε here; along the normal, where it lies, it is ε/|Mᵀn|.
-        let stretched = error * largest_stretch(&self.world_from_innermost.matrix3);
-        let Tangent { normal, curvature, .. } = self.innermost().tangent(&object_ray, hit);
-        let shrunk = length(self.across(normal));
-        let across = 1.01 * error / shrunk;
-        let bends = self.curved(curvature, shrunk) * across;
-        let off = if bends < 0.005 && across < stretched { across } else { stretched };
-        SurfacePoint { position: world, error: (off + rounding) * INFLATE }
+        self.contact(world_ray, hit).0
+    }
+
+    fn tangent(&self, world_ray: &Ray, hit: &Hit) -> Tangent {
+        self.contact(world_ray, hit).1
+    }
+
+    fn contact(&self, world_ray: &Ray, hit: &Hit) -> (SurfacePoint, Tangent) {
+        let (point, tangent) = self.innermost().contact(&self.object_ray(world_ray), hit);
+        let across = self.across(tangent.normal);
+        let shrunk = length(across);
+        (self.world_point(point, tangent.curvature, shrunk), self.world_tangent(&tangent, across, shrunk))
     }
 
     fn departs(&self, world_ray: &Ray, hit: &Hit, outward: bool) -> bool {
@@ -345,7 +369,7 @@ impl<S: Shape> Shape for Affine<S> {
         }
         // Behind the rounded image's origin, and before the exact one's? Only what was left may be there.
         let mut zone = Interval { max: f64::from_bits(1), ..widened(&image, Interval::FORWARD) };
-        while let Some(behind) = self.innermost().intersect(&image.ray, zone) {
+        while let Some(behind) = self.innermost().intersect_piece(&image.ray, hit, zone) {
             let left = matches!(self.place(&image, &behind, Interval::FORWARD, zone.min), Place::Before);
             if !left && behind.part == hit.part {
                 return false;
@@ -353,15 +377,6 @@ impl<S: Shape> Shape for Affine<S> {
             zone.min = past(&behind, zone);
         }
         true
-    }
-
-    fn tangent(&self, world_ray: &Ray, hit: &Hit) -> Tangent {
-        let Tangent { normal, normal_error, curvature } = self.innermost().tangent(&self.object_ray(world_ray), hit);
-        let shrunk = length(self.across(normal));
-        // |δ(Mᵀn)| ≤ ‖M‖(|δn| + a few u); of it only what is across Mᵀn turns the unit vector.
-        let turned = 1.01 * (normal_error + 8.0 * U) * (self.norm() / shrunk);
-        let curvature = self.curved(curvature, shrunk);
-        Tangent { normal: self.world_normal(normal), normal_error: turned + 8.0 * U, curvature }
     }
 
     fn precise_lambda(&self, world_ray: &Ray, hit: &Hit) -> [f64; 2] {

@@ -77,6 +77,18 @@ pub trait Shape: Debug + Send + Sync {
         Tangent { normal: self.normal(ray, hit), normal_error: 8.0 * f64::EPSILON, curvature: 0.0 }
     }
 
+    /// [`point`](Self::point) and [`tangent`](Self::tangent) at once, for which curved shapes and maps work out the same things.
+    fn contact(&self, ray: &Ray, hit: &Hit) -> (SurfacePoint, Tangent) {
+        (self.point(ray, hit), self.tangent(ray, hit))
+    }
+
+    /// [`intersect`](Self::intersect) where only the piece of surface that `hit` lies on matters: hits of others may be answered
+    /// too, or not. The default looks at the whole shape; a mesh at one triangle.
+    fn intersect_piece(&self, ray: &Ray, hit: &Hit, within: Interval) -> Option<Hit> {
+        let _ = hit;
+        self.intersect(ray, within)
+    }
+
     /// The shape and the map, if this is another shape seen through an affine map (from the world to its frame): a chain of
     /// [`Affine`](crate::Affine)s takes a ray to the innermost shape in one step. None by default.
     fn seen_through(&self) -> Option<(&dyn Shape, &Map)> {
@@ -144,6 +156,12 @@ macro_rules! forward_shape {
             }
             fn tangent(&self, ray: &Ray, hit: &Hit) -> Tangent {
                 (**self).tangent(ray, hit)
+            }
+            fn contact(&self, ray: &Ray, hit: &Hit) -> (SurfacePoint, Tangent) {
+                (**self).contact(ray, hit)
+            }
+            fn intersect_piece(&self, ray: &Ray, hit: &Hit, within: Interval) -> Option<Hit> {
+                (**self).intersect_piece(ray, hit, within)
             }
             fn seen_through(&self) -> Option<(&dyn Shape, &Map)> {
                 (**self).seen_through()

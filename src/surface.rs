@@ -1,6 +1,6 @@
 //! A hit looked at closely: where it is, which way the surface faces, and how to leave it.
 
-use crate::{Hit, Ray, Shape};
+use crate::{Hit, Ray, Shape, SurfacePoint, Tangent};
 use glam::{DVec2, DVec3};
 
 /// The surface at a hit, and rays that leave it.
@@ -30,8 +30,8 @@ impl<'a> Surface<'a> {
     /// The surface of `shape` where `ray` met it at `hit`.
     #[must_use]
     pub fn new(shape: &'a dyn Shape, ray: &Ray, hit: &Hit) -> Self {
-        let point = shape.point(ray, hit);
-        Self { shape, ray: *ray, hit: *hit, point: point.position, error: point.error, normal: shape.normal(ray, hit) }
+        let (SurfacePoint { position, error }, Tangent { normal, .. }) = shape.contact(ray, hit);
+        Self { shape, ray: *ray, hit: *hit, point: position, error, normal }
     }
 
     /// The point, at most [`error`](Self::error) off the surface.

@@ -3,7 +3,8 @@
 //! Sources: Knuth (two-sum), Dekker 1971 and Veltkamp (two-product without FMA), Ogita, Rump, Oishi 2005.
 //! Exact as long as nothing over- or underflows: docs/numerics.md §1.
 
-use super::cpu::{FusedLanes, fused_lanes};
+use super::bound::LARGE;
+use super::cpu::{FusedLanes, dispatch, fused_lanes};
 use super::lanes::{Lanes, Plain};
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
@@ -153,14 +154,28 @@ fn splits<S: Simd, V: SimdFloat<S, Element = f64>>(a: V) -> (V, V) {
 /// o + λd, each component rounded once or nearly: off by (u + 3u²(|oᵢ| + |λdᵢ|)/|result|) of itself.
 #[must_use]
 pub fn step(o: DVec3, lambda: f64, d: DVec3) -> DVec3 {
+    dispatch(
+        #[inline(always)]
+        move || step_with::<Fused>(o, lambda, d),
+        #[inline(always)]
+        move || step_with::<Split>(o, lambda, d),
+    )
+}
+
+#[inline(always)]
+fn step_with<P: Product>(o: DVec3, lambda: f64, d: DVec3) -> DVec3 {
     let component = |o: f64, d: f64| {
-        let (p, p_lo) = Split::two_product(lambda, d);
+        let (p, p_lo) = P::two_product(lambda, d);
         let (s, s_lo) = two_sum(o, p);
         let value = s + (s_lo + p_lo);
-        // Splitting overflows before the product does.
         if value.is_nan() { o + p } else { value }
     };
-    DVec3::new(component(o.x, d.x), component(o.y, d.y), component(o.z, d.z))
+    // Splitting overflows before the product does.
+    if lambda.abs().max(d.abs().max_element()) < LARGE {
+        DVec3::new(component(o.x, d.x), component(o.y, d.y), component(o.z, d.z))
+    } else {
+        o + lambda * d
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ mod fixed;
 pub mod float;
 pub mod frustum;
 pub mod lanes;
+mod leaving;
 pub mod map;
 pub(crate) mod norm;
 pub mod number;

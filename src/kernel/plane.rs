@@ -8,6 +8,7 @@ use super::cpu;
 use super::eft::{Fused, Product, Split, two_diff, two_sum};
 use super::float::{exponent_of, ldexp, power};
 use super::lanes::{Double, Lanes, Two};
+use super::leaving;
 use super::number::{self, Number, difference, dot, vector};
 use super::ratio::{self, Ratio};
 use super::tally;
@@ -226,27 +227,54 @@ pub fn side(point: DVec3, normal: DVec3, x: DVec3) -> Ordering {
     number::sign_of(|| form(point, normal, x), || form(point, normal, x))
 }
 
+/// Whether `ray` starts strictly on the side of the plane that `normal` points to, or for `outward` = false on the other, and
+/// does not meet the plane on its way: both exactly. `point` and `normal` finite.
+#[must_use]
+pub fn departs(ray: &Ray, point: DVec3, normal: DVec3, outward: bool) -> bool {
+    leaving::plane(ray, &point, &[normal, DVec3::ZERO], outward).unwrap_or_else(|| {
+        let beyond = if outward { Ordering::Greater } else { Ordering::Less };
+        ray.is_valid()
+            && side(point, normal, ray.origin) == beyond
+            && intersect(ray, point, normal, Interval::FORWARD).is_none()
+    })
+}
+
 /// `x`, which lies near the plane through `point` with the normal `n` + `n_lo` of any length, moved onto it along the
 /// normal, and a bound on its distance from the plane: little more than what rounding the three coordinates costs.
 /// docs/numerics.md §3.
 #[must_use]
 pub fn project(point: DVec3, [n, n_lo]: [DVec3; 2], x: DVec3) -> (DVec3, f64) {
-    // A power of two makes the normal short enough to be squared.
-    let k = -exponent_of(n.abs().max_element());
-    let scaled = |v: DVec3| DVec3::from(v.to_array().map(|x| ldexp(x, k)));
-    let (n, n_lo) = (scaled(n), scaled(n_lo));
-    // Nor do the largest coordinates overflow.
-    let far = x.abs().max(point.abs()).max_element() > power(900);
+    // Powers of two make the normal short enough to be squared, and keep the largest coordinates from overflowing.
+    let (length, far) = (n.abs().max_element(), x.abs().max(point.abs()).max_element() > power(900));
+    if (power(-100)..power(100)).contains(&length) && !far {
+        return foot(point, [n, n_lo], x);
+    }
+    let scaled = |v: DVec3| v.map(|x| ldexp(x, -exponent_of(length)));
     let (down, up) = if far { (power(-200), power(200)) } else { (1.0, 1.0) };
-    let (x, point) = (x * down, point * down);
+    let (moved, off) = foot(point * down, [scaled(n), scaled(n_lo)], x * down);
+    (moved * up, off * up)
+}
+
+/// [`project`] where nothing overflows.
+fn foot(point: DVec3, normal: [DVec3; 2], x: DVec3) -> (DVec3, f64) {
+    cpu::dispatch(
+        #[inline(always)]
+        move || foot_with::<Fused>(point, normal, x),
+        #[inline(always)]
+        move || foot_with::<Split>(point, normal, x),
+    )
+}
+
+#[inline(always)]
+fn foot_with<P: Product>(point: DVec3, [n, n_lo]: [DVec3; 2], x: DVec3) -> (DVec3, f64) {
     let ((sx, tx), (sy, ty), (sz, tz)) = (two_diff(x.x, point.x), two_diff(x.y, point.y), two_diff(x.z, point.z));
     let (s, s_lo) = (DVec3::new(sx, sy, sz), DVec3::new(tx, ty, tz));
-    let (h, h_lo, size) = dot2::<Split>(n, s, n.dot(s_lo) + n_lo.dot(s));
+    let (h, h_lo, size) = dot2::<P>(n, s, n.dot(s_lo) + n_lo.dot(s));
     let (h, length) = (h + h_lo, n.length());
     let moved = x - n * (h / (length * length));
-    let off = (34.0 * U * U * size + 8.0 * U * h.abs() + UNDERFLOW) / length;
+    let off = (34.0 * U * U * size + 8.0 * U * h.abs() + UNDERFLOW) / length + UNDERFLOW;
     let rounding = U * n.abs().dot(moved.abs()) / length;
-    (moved * up, (off + rounding) * (1.0 + 16.0 * U) * up)
+    (moved, (off + rounding) * (1.0 + 16.0 * U))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use super::bounded::Bounded;
 use super::cpu;
 use super::dyadic::Dyadic;
 use super::eft::{Fused, Product, Split};
+use super::leaving;
 use super::number::{Number, Vector, cross, difference, dot, sign_of, vector};
 use super::plane::{Quotient, quotient, quotient_closely};
 use super::ratio::{self, Ratio};
@@ -90,8 +91,18 @@ impl Contours {
     /// The exact sign of n·(x − v₀): on which side of the plane `x` lies; `x` finite.
     #[must_use]
     pub fn side(&self, x: DVec3) -> Ordering {
-        let height = |x| dot(&self.exact_normal, &difference(x, self.vertices[0]));
-        height(x).sign().unwrap_or(Ordering::Equal)
+        let from = self.vertices[0];
+        sign_of(|| dot(&self.bounded_normal(), &difference(x, from)), || dot(&self.exact_normal, &difference(x, from)))
+    }
+
+    /// Whether `ray` starts strictly on the side of the plane that the normal points to, or for `outward` = false on the
+    /// other, and does not meet the polygon on its way: both exactly.
+    #[must_use]
+    pub fn departs(&self, ray: &Ray, outward: bool) -> bool {
+        leaving::plane(ray, &self.vertices[0], &self.normal, outward).unwrap_or_else(|| {
+            let beyond = if outward { Ordering::Greater } else { Ordering::Less };
+            ray.is_valid() && self.side(ray.origin) == beyond && intersect(ray, self, Interval::FORWARD).is_none()
+        })
     }
 
     /// The distance of `x` from the plane, to a few units in the last place; exactly zero if it lies on it.

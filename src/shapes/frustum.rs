@@ -144,8 +144,20 @@ impl Frustum {
         unit(length(f.axis) * radial - growth * axis).unwrap_or(radial)
     }
 
-    pub(super) fn point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+    pub(super) fn contact(&self, ray: &Ray, hit: &Hit) -> (SurfacePoint, Tangent) {
         let f = self.foot(ray, hit);
+        (self.point_at(&f, hit), self.tangent_at(&f, ray, hit))
+    }
+
+    pub(super) fn point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        self.point_at(&self.foot(ray, hit), hit)
+    }
+
+    pub(super) fn tangent(&self, ray: &Ray, hit: &Hit) -> Tangent {
+        self.tangent_at(&self.foot(ray, hit), ray, hit)
+    }
+
+    fn point_at(&self, f: &Foot, hit: &Hit) -> SurfacePoint {
         let (r0, r1) = (f.local.inside(self.base_radius), f.local.inside(self.top_radius));
         let clamped = |r: f64| {
             let from_axis = length(f.radial);
@@ -218,9 +230,8 @@ impl Frustum {
 
     /// A cone's wall curves at most as its circle does (by the cosine less). The radial part of its normal is off by 8u of
     /// the distance from the nearer end; docs/numerics.md §6.
-    pub(super) fn tangent(&self, ray: &Ray, hit: &Hit) -> Tangent {
-        let f = self.foot(ray, hit);
-        let normal = self.normal_at(&f, ray, hit);
+    fn tangent_at(&self, f: &Foot, ray: &Ray, hit: &Hit) -> Tangent {
+        let normal = self.normal_at(f, ray, hit);
         if hit.part == BASE || hit.part == TOP {
             return Tangent { normal, normal_error: 16.0 * U, curvature: 0.0 };
         }
@@ -294,6 +305,10 @@ macro_rules! shape_by_frustum {
 
             fn tangent(&self, ray: &crate::Ray, hit: &crate::Hit) -> crate::Tangent {
                 self.0.tangent(ray, hit)
+            }
+
+            fn contact(&self, ray: &crate::Ray, hit: &crate::Hit) -> (crate::SurfacePoint, crate::Tangent) {
+                self.0.contact(ray, hit)
             }
 
             fn precise_lambda(&self, ray: &crate::Ray, hit: &crate::Hit) -> [f64; 2] {

@@ -3,7 +3,6 @@
 use crate::kernel::{eft, float, plane};
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DVec2, DVec3};
-use std::cmp::Ordering;
 
 /// The plane n·(p − `point`) = 0, unbounded.
 ///
@@ -85,10 +84,7 @@ impl Shape for Plane {
     }
 
     fn departs(&self, ray: &Ray, _: &Hit, outward: bool) -> bool {
-        let side = if outward { Ordering::Greater } else { Ordering::Less };
-        ray.is_valid()
-            && plane::side(self.point, self.normal, ray.origin) == side
-            && !self.occludes(ray, Interval::FORWARD)
+        plane::departs(ray, self.point, self.normal, outward)
     }
 
     fn precise_lambda(&self, ray: &Ray, _: &Hit) -> [f64; 2] {

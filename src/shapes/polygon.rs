@@ -6,7 +6,6 @@ use crate::kernel::polygon::{self, Contours};
 use crate::kernel::{eft, float, plane};
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DAffine3, DVec2, DVec3};
-use std::cmp::Ordering;
 
 /// A planar polygon, with holes if need be: concave or self-intersecting, even-odd.
 ///
@@ -137,8 +136,7 @@ impl Shape for Polygon {
     }
 
     fn departs(&self, ray: &Ray, _: &Hit, outward: bool) -> bool {
-        let side = if outward { Ordering::Greater } else { Ordering::Less };
-        ray.is_valid() && self.contours.side(ray.origin) == side && !self.occludes(ray, Interval::FORWARD)
+        self.contours.departs(ray, outward)
     }
 
     fn precise_lambda(&self, ray: &Ray, _: &Hit) -> [f64; 2] {

@@ -114,12 +114,21 @@ impl Shape for Sphere {
     }
 
     fn point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        let normal = self.normal(ray, hit);
-        let position = self.center + self.radius * normal;
+        self.contact(ray, hit).0
+    }
+
+    fn tangent(&self, ray: &Ray, hit: &Hit) -> Tangent {
+        let curvature = (1.0 / self.radius).next_up();
+        Tangent { normal: self.normal(ray, hit), normal_error: 16.0 * U, curvature }
+    }
+
+    fn contact(&self, ray: &Ray, hit: &Hit) -> (SurfacePoint, Tangent) {
+        let tangent = self.tangent(ray, hit);
+        let position = self.center + self.radius * tangent.normal;
         // The normal's length is off by less than 4u, so the product by less than 5u·r, and the sum by u of itself;
         // the last term is for subnormal results.
         let error = 6.0 * U * self.radius + 2.0 * length(U * position) + f64::from_bits(8);
-        SurfacePoint { position, error }
+        (SurfacePoint { position, error }, tangent)
     }
 
     fn departs(&self, ray: &Ray, _hit: &Hit, outward: bool) -> bool {
@@ -128,11 +137,6 @@ impl Shape for Sphere {
         }
         let side = sphere::side(ray.origin, self.center, self.radius);
         if outward { side.is_gt() && self.intersect(ray, Interval::FORWARD).is_none() } else { side.is_lt() }
-    }
-
-    fn tangent(&self, ray: &Ray, hit: &Hit) -> Tangent {
-        let curvature = (1.0 / self.radius).next_up();
-        Tangent { normal: self.normal(ray, hit), normal_error: 16.0 * U, curvature }
     }
 
     fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {

@@ -3,7 +3,6 @@
 use crate::kernel::triangle;
 use crate::{Aabb, Hit, Interval, InvalidShape, Ray, Shape, SurfacePoint};
 use glam::{DAffine3, DVec3};
-use std::cmp::Ordering;
 
 /// A triangle, edges and vertices included.
 ///
@@ -74,8 +73,7 @@ impl Shape for Triangle {
     }
 
     fn departs(&self, ray: &Ray, _: &Hit, outward: bool) -> bool {
-        let side = if outward { Ordering::Greater } else { Ordering::Less };
-        ray.is_valid() && triangle::side(&self.vertices, ray.origin) == side && !self.occludes(ray, Interval::FORWARD)
+        triangle::departs(ray, &self.vertices, outward)
     }
 
     fn precise_lambda(&self, ray: &Ray, _: &Hit) -> [f64; 2] {

@@ -10,7 +10,7 @@ use crate::kernel::cpu;
 use crate::kernel::dyadic::Dyadic;
 use crate::kernel::eft::{Fused, Product, Split, two_diff, two_sum};
 use crate::kernel::fixed;
-use crate::kernel::float::{length, power};
+use crate::kernel::float::power;
 use crate::kernel::lanes::{Double, Lanes, Two};
 use crate::kernel::number::{self, Number, cross, difference, dot, vector};
 use crate::kernel::ratio::{self, Ratio};
@@ -22,6 +22,9 @@ use std::cmp::Ordering;
 use std::hint::black_box;
 
 pub mod eight;
+mod surface;
+
+pub use surface::{departs, normal, point, side};
 
 /// Where `ray` meets the closed triangle of the three `vertices`, if λ lies inside `within`.
 ///
@@ -502,41 +505,6 @@ pub fn crossing_sign(ray: &Ray, a: DVec3, b: DVec3) -> Ordering {
 pub fn crosses(ray: &Ray, &[a, b, c]: &[DVec3; 3]) -> bool {
     let sign = crossing_sign(ray, a, b);
     sign != Ordering::Equal && sign == crossing_sign(ray, b, c) && sign == crossing_sign(ray, c, a)
-}
-
-/// The unit normal (b−a)×(c−a)/|…|, each component to a few ulps of the largest however thin the triangle; zero if it is
-/// degenerate. All vertices finite.
-#[must_use]
-pub fn normal(vertices: &[DVec3; 3]) -> DVec3 {
-    fn form<N: Number>(&[a, b, c]: &[DVec3; 3]) -> [N; 3] {
-        cross(&difference(b, a), &difference(c, a))
-    }
-    number::unit(&form::<Bounded>(vertices))
-        .unwrap_or_else(|| number::unit(&form::<Dyadic>(vertices)).unwrap_or_default())
-}
-
-/// The point a + u·(b−a) + v·(c−a), and a bound on its distance from the triangle's plane. The weights u, v ≥ 0 are those
-/// of a hit of `ray`; here they are found again, to the last bit or nearly.
-#[must_use]
-pub fn point(ray: &Ray, vertices: &[DVec3; 3], uv: DVec2) -> (DVec3, f64) {
-    let forms = Forms::of(ray, vertices);
-    let uv = if forms.lambda()[0].is_nan() { uv } else { weights(forms.uv[0], forms.uv[1]) };
-    let [a, b, c] = *vertices;
-    let (f, g) = (uv.x * (b - a), uv.y * (c - a));
-    let position = a + (f + g);
-    // Each of b−a, its multiple and their sum is rounded, then the sum with a; underflow is below the last place.
-    let off = 3.0 * U * (f.abs() + g.abs()) + U * position.abs();
-    (position, length(off) * (1.0 + 8.0 * U) + f64::MIN_POSITIVE)
-}
-
-/// On which side of the triangle's plane `point` lies, exactly: the sign of n·(point − a), n = (b−a)×(c−a).
-/// [`Ordering::Equal`] also for a degenerate triangle. All arguments finite.
-#[must_use]
-pub fn side(vertices: &[DVec3; 3], point: DVec3) -> Ordering {
-    fn form<N: Number>(&[a, b, c]: &[DVec3; 3], point: DVec3) -> N {
-        dot(&cross(&difference(b, a), &difference(c, a)), &difference(point, a))
-    }
-    number::sign_of(|| form(vertices, point), || form(vertices, point))
 }
 
 #[cfg(test)]

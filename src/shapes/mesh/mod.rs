@@ -270,11 +270,12 @@ impl Shape for Mesh {
     }
 
     fn departs(&self, ray: &Ray, hit: &Hit, outward: bool) -> bool {
-        let vertices = self.vertices(hit.part);
-        let side = if outward { std::cmp::Ordering::Greater } else { std::cmp::Ordering::Less };
-        ray.is_valid()
-            && triangle::side(&vertices, ray.origin) == side
-            && triangle::intersect(ray, &vertices, Interval::FORWARD).is_none()
+        triangle::departs(ray, &self.vertices(hit.part), outward)
+    }
+
+    fn intersect_piece(&self, ray: &Ray, hit: &Hit, within: Interval) -> Option<Hit> {
+        let found = triangle::intersect(ray, &self.vertices(hit.part), within)?;
+        Some(Hit { part: hit.part, ..found })
     }
 
     fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {
