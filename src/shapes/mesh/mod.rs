@@ -160,7 +160,10 @@ impl Mesh {
     #[must_use]
     #[inline]
     pub fn vertices(&self, part: u32) -> [DVec3; 3] {
-        self.triangles[part as usize].map(|i| self.positions[i as usize])
+        // `map` would be a call, and leave the vertices in memory.
+        let [a, b, c] = self.triangles[part as usize];
+        let position = |i: u32| self.positions[i as usize];
+        [position(a), position(b), position(c)]
     }
 
     /// The nearest hits of many rays: `hits[i]` becomes what [`intersect`](Shape::intersect) answers to `rays[i]`, to the bit.

@@ -11,19 +11,22 @@ use glam::DVec3;
 use std::cmp::Ordering;
 
 /// The nearest hit; the lowest triangle of those met at exactly the same λ.
+///
+/// By value down to where it is found: in memory of this function's it would be copied by loads that wait for all of its stores.
+#[inline(always)]
 pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
-    // The one place for the answer on the way through all functions: returned, it would be copied by each.
-    let mut hit = None;
-    find_closest(mesh, ray, within, &mut hit);
-    hit
+    let asked = Asked::new(mesh, ray, within);
+    dispatch!(mesh.level.token(), simd => {
+        if is_baseline(simd) { closest_apart(simd, &asked) } else { closest_with(simd, &asked) }
+    })
 }
 
-/// [`closest`] where it is wanted.
+/// [`closest`] where it is wanted, compiled apart for the same reason.
 #[inline(always)]
 pub(super) fn find_closest(mesh: &Mesh, ray: &Ray, within: Interval, hit: &mut Option<Hit>) {
-    let mut search = Search { asked: Asked::new(mesh, ray, within), hit };
+    let asked = Asked::new(mesh, ray, within);
     dispatch!(mesh.level.token(), simd => {
-        if is_baseline(simd) { closest_apart(simd, &mut search) } else { closest_with(simd, &mut search) }
+        *hit = if is_baseline(simd) { closest_apart(simd, &asked) } else { closest_with(simd, &asked) };
     });
 }
 
@@ -38,8 +41,8 @@ fn is_baseline<S: Simd>(simd: S) -> bool {
 }
 
 #[inline(never)]
-fn closest_apart<S: Simd>(simd: S, search: &mut Search) {
-    closest_with(simd, search);
+fn closest_apart<S: Simd>(simd: S, asked: &Asked) -> Option<Hit> {
+    closest_with(simd, asked)
 }
 
 /// A query on its way into a dispatched function, which takes it through memory. The limits do not stand side by side: they would be stored
@@ -50,12 +53,6 @@ struct Asked<'a> {
     ray: &'a Ray,
     max: f64,
     mesh: &'a Mesh,
-}
-
-/// With where the answer goes.
-struct Search<'a> {
-    asked: Asked<'a>,
-    hit: &'a mut Option<Hit>,
 }
 
 impl<'a> Asked<'a> {
@@ -71,38 +68,33 @@ impl<'a> Asked<'a> {
 }
 
 #[inline(always)]
-fn closest_with<S: Simd>(simd: S, search: &mut Search) {
-    let asked = &search.asked;
+fn closest_with<S: Simd>(simd: S, asked: &Asked) -> Option<Hit> {
     match LocalRay::new(simd, asked.mesh.frame(), asked.ray, asked.within()) {
-        Some(local) => closest_along::<S, true>(simd, search, &local),
-        None => closest_uncommon(simd, search),
+        Some(local) => closest_along::<S, true>(simd, asked, &local),
+        None => closest_uncommon(simd, asked),
     }
 }
 
 #[inline(never)]
-fn closest_uncommon<S: Simd>(simd: S, search: &mut Search) {
+fn closest_uncommon<S: Simd>(simd: S, asked: &Asked) -> Option<Hit> {
     simd.vectorize(
         #[inline(always)]
-        move || {
-            let &Asked { ray, mesh, .. } = &search.asked;
-            let within = search.asked.within();
-            match LocalRay::uncommon(simd, mesh.frame(), ray, within) {
-                Some(local) => closest_along::<S, false>(simd, search, &local),
-                None => *search.hit = closest_of_all(mesh, ray, within),
-            }
+        move || match LocalRay::uncommon(simd, asked.mesh.frame(), asked.ray, asked.within()) {
+            Some(local) => closest_along::<S, false>(simd, asked, &local),
+            None => closest_of_all(asked.mesh, asked.ray, asked.within()),
         },
-    );
+    )
 }
 
 #[inline(always)]
-fn closest_along<S: Simd, const FORWARD: bool>(simd: S, search: &mut Search, local: &LocalRay) {
-    let &Asked { ray, mesh, .. } = &search.asked;
+fn closest_along<S: Simd, const FORWARD: bool>(simd: S, asked: &Asked, local: &LocalRay) -> Option<Hit> {
+    let &Asked { ray, mesh, .. } = asked;
     let mut walk = Single {
         probe: Probe::new(local, mesh.exact),
-        nearest: Nearest::new(mesh, ray, search.asked.within(), local.limits, local.sure, local.t_max),
+        nearest: Nearest::new(mesh, ray, asked.within(), local.limits, local.sure, local.t_max),
     };
     bvh::closest(simd, &mesh.tree, &Lanes::<S, FORWARD>::new(simd, local), local.t_max, &mut walk);
-    walk.nearest.settle(simd, search.hit);
+    walk.nearest.settle(simd)
 }
 
 /// Whether anything is hit.
@@ -229,16 +221,15 @@ impl<'a> Nearest<'a> {
 
     /// The answer.
     #[inline(always)]
-    fn settle<S: Simd>(&mut self, simd: S, hit: &mut Option<Hit>) {
-        if self.count == 1 && self.best.is_none() {
-            // The rule.
-            self.passed(simd, self.passed[0].spot, hit);
-            return;
+    fn settle<S: Simd>(&mut self, simd: S) -> Option<Hit> {
+        match (self.count, self.best.is_some()) {
+            (0, false) => None,
+            (1, false) => self.passed(simd, self.passed[0].spot),
+            _ => {
+                self.decide(simd);
+                self.best
+            }
         }
-        if self.count > 0 {
-            self.decide(simd);
-        }
-        *hit = self.best;
     }
 
     /// Considers a triangle that may be met between the t of `depth`; `through`: whose inside the line certainly passes.
@@ -274,12 +265,12 @@ impl<'a> Nearest<'a> {
 
     /// The hit of a triangle that is certainly hit.
     #[inline(always)]
-    fn passed<S: Simd>(&self, simd: S, spot: Spot, answer: &mut Option<Hit>) {
+    fn passed<S: Simd>(&self, simd: S, spot: Spot) -> Option<Hit> {
         let (leaf, lane) = spot.at(self.mesh);
         let vertices = leaf.vertices(lane, self.mesh);
         match triangle::passed(simd, self.ray, &vertices, leaf.has_plain_edges(lane)) {
-            Some(hit) if !UNCERTIFIED => *answer = Some(Hit { part: leaf.number(lane), ..hit }),
-            _ => *answer = self.exactly_apart(simd, spot),
+            Some(hit) if !UNCERTIFIED => Some(Hit { part: leaf.number(lane), ..hit }),
+            _ => self.exactly_apart(simd, spot),
         }
     }
 
