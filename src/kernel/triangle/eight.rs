@@ -1,18 +1,17 @@
-//! The fast path for eight rays at once, each with a triangle of its own: a register holds the same number of all.
+//! λ of eight rays at once, each with a triangle of its own: a register holds the same number of all.
 //!
-//! The operations are those of [`intersect_with`](super::intersect_with), each rounded alike, in the same order: what is
-//! answered here has the same bits.
+//! The operations are those of [`passed`](super::passed), each rounded alike, in the same order: what is answered here
+//! has the same bits.
 
-use super::{LARGEST, PRESENT, VANISHED, WEIGHT};
-use crate::kernel::bound::{TRIANGLE_CONDITION, TRIANGLE_LAMBDA, TRIANGLE_SIDES, U};
+use crate::kernel::bound::{TRIANGLE_LAMBDA, U};
 use crate::kernel::cpu;
 use crate::kernel::eft::{Fused, Product, Split, two_diff, two_sum};
-use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
+use fearless_simd::{Simd, f64x8, prelude::*};
 
 /// Of eight vectors the x, the y and the z.
 pub type Vectors<S> = [f64x8<S>; 3];
 
-/// Eight rays, each with a triangle and an interval.
+/// Eight rays, each with a triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays<S: Simd> {
     /// Where they begin.
@@ -21,76 +20,59 @@ pub struct Rays<S: Simd> {
     pub direction: Vectors<S>,
     /// The first, second and third vertex of each one's triangle.
     pub vertices: [Vectors<S>; 3],
-    /// Between which λ counts, the ends excluded.
-    pub within: [f64x8<S>; 2],
 }
 
-/// What [`intersect`] found; a bit of the masks is a ray, the lowest the first.
+/// What [`passed`] found.
 #[derive(Clone, Copy, Debug)]
-pub struct Eight<S: Simd> {
-    /// λ of those that hit.
+pub struct Passed<S: Simd> {
+    /// λ.
     pub lambda: f64x8<S>,
     /// How far off λ may be.
     pub error: f64x8<S>,
     /// The weights of the second and of the third vertex.
     pub uv: [f64x8<S>; 2],
-    /// Which rays certainly hit.
-    pub hit: u32,
-    /// Which rays [`super::intersect`] has to answer: neither do they certainly hit nor certainly miss.
-    pub unsure: u32,
+    /// Of which rays that is so, a bit each, the lowest the first; the others are for [`super::intersect`].
+    pub known: u32,
 }
 
-/// Where eight rays meet a triangle each, to the bit as [`super::intersect`] has it, as far as the fast path is certain.
+/// [`super::passed`] for eight rays. `plain`: the edges of all triangles are vectors of floats. `least`, times |e₁||e₂| in
+/// largest components: what |D| and |N| have to be above.
 ///
 /// For code that was dispatched to the instructions of `simd`.
 #[inline(always)]
 #[must_use]
-pub fn intersect<S: Simd>(simd: S, rays: &Rays<S>) -> Eight<S> {
-    if cpu::has_fused(simd) { fast::<S, Fused>(simd, rays) } else { fast::<S, Split>(simd, rays) }
+pub fn passed<S: Simd>(simd: S, rays: &Rays<S>, plain: bool, least: [f64; 2]) -> Passed<S> {
+    if cpu::has_fused(simd) {
+        hits::<S, Fused>(simd, rays, plain, least)
+    } else {
+        hits::<S, Split>(simd, rays, plain, least)
+    }
 }
 
 #[inline(always)]
-fn fast<S: Simd, P: Product>(simd: S, rays: &Rays<S>) -> Eight<S> {
+fn hits<S: Simd, P: Product>(simd: S, rays: &Rays<S>, plain: bool, least: [f64; 2]) -> Passed<S> {
     let splat = |x: f64| f64x8::splat(simd, x);
-    let Rays { origin: o, direction: d, vertices: [a, b, c], within: [min, max] } = rays;
-    let (e1, e2, s) = (Double::difference(b, a), Double::difference(c, a), Double::difference(o, a));
-    let (n, q) = (e1.cross::<P>(&e2), cross(d, &s.hi));
+    let Rays { origin: o, direction: d, vertices: [a, b, c] } = rays;
+    let (e1, e2, s) = (minus(b, a), minus(c, a), Double::difference(o, a));
+    let mut n = Double::cross::<P>(&e1, &e2);
+    if !plain {
+        n.add_low_parts(&Double::difference(b, a), &Double::difference(c, a));
+    }
+    let q = cross(d, &s.hi);
     let (nd, ns) = (n.times_float::<P>(d), n.times::<P>(&s));
     let ((det, det_lo), (height, height_lo)) = (nd.sum(), ns.sum());
-    let (su, minus_sv) = (dot(&q, &e2.hi), dot(&q, &e1.hi));
+    let (su, minus_sv) = (dot(&q, &e2), dot(&q, &e1));
 
-    let (d, s, m1, m2) = (largest(d), largest(&s.hi), largest(&e1.hi), largest(&e2.hi));
-    let (sum, m12) = (m1 + m2, m1 * m2);
-    let ordinary = ((sum + s) + d).simd_lt(splat(LARGEST));
-    let bound = splat(TRIANGLE_SIDES) * (d * (m12 + s * sum)) + splat(VANISHED);
-    let (sv, sw) = (-minus_sv, (det - su) + minus_sv);
-    // A NaN among them is one in D or N as well, and those are not known then.
-    let (least, most) = (su.min(sv).min(sw), su.max(sv).max(sw));
-    let miss = ordinary & least.simd_lt(-bound) & most.simd_gt(bound);
-    let through = ordinary & (least.simd_gt(bound) | most.simd_lt(-bound));
+    let m12 = largest(&e1) * largest(&e2);
+    let known = det.abs().simd_gt(m12 * splat(least[0])) & height.abs().simd_gt(m12 * splat(least[1]));
 
     let inverse = splat(1.0) / det;
-    let certain =
-        through & is_known(det, d * m12) & is_known(height, s * m12) & (bound * inverse.abs()).simd_le(splat(WEIGHT));
-
     let first = -height * inverse;
     let error = splat(U + TRIANGLE_LAMBDA) * first.abs();
     let remainder = P::remainders::<S, _>(height, -first, det) + (height_lo + first * det_lo);
     let lambda = first - remainder * inverse;
-    let (from, to) = (lambda - error, lambda + error);
-    let hit = certain & from.simd_gt(*min) & to.simd_lt(*max);
-    let miss = miss | certain & (to.simd_lt(*min) | from.simd_gt(*max));
-    let uv = [(su * inverse).min(splat(1.0)), (sv * inverse).min(splat(1.0))];
-    Eight { lambda, error, uv, hit: hit.to_bitmask() as u32, unsure: (!(hit | miss)).to_bitmask() as u32 }
-}
-
-/// Whether a triple product, of sizes with this product, has lost few enough bits: known before λ is.
-#[inline(always)]
-fn is_known<S: Simd>(product: f64x8<S>, size: f64x8<S>) -> mask64x8<S> {
-    let splat = |x: f64| f64x8::splat(size.simd, x);
-    let amplified = product.abs() * splat(TRIANGLE_CONDITION);
-    (size + splat(TRIANGLE_CONDITION * PRESENT)).simd_lt(amplified)
-        & amplified.simd_lt(splat(TRIANGLE_CONDITION / PRESENT))
+    let uv = [(su * inverse).min(splat(1.0)), (-minus_sv * inverse).min(splat(1.0))];
+    Passed { lambda, error, uv, known: known.to_bitmask() as u32 }
 }
 
 /// Eight vectors as unevaluated sums; as in [`lanes`](crate::kernel::lanes), where a register holds one vector.
@@ -115,22 +97,28 @@ impl<S: Simd> Double<S> {
         )
     }
 
+    /// Of vectors of floats.
     #[inline(always)]
-    fn cross<P: Product>(&self, other: &Self) -> Self {
+    fn cross<P: Product>(a: &Vectors<S>, b: &Vectors<S>) -> Self {
         Self::each(
             #[inline(always)]
             |i| {
                 let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-                let ((p, p_lo), (m, m_lo)) = (
-                    P::two_products::<S, _>(self.hi[j], other.hi[k]),
-                    P::two_products::<S, _>(self.hi[k], other.hi[j]),
-                );
+                let ((p, p_lo), (m, m_lo)) = (P::two_products::<S, _>(a[j], b[k]), P::two_products::<S, _>(a[k], b[j]));
                 let (hi, rounding) = two_diff(p, m);
-                let forth = self.hi[j] * other.lo[k] + self.lo[j] * other.hi[k];
-                let back = self.hi[k] * other.lo[j] + self.lo[k] * other.hi[j];
-                (hi, ((p_lo - m_lo) + rounding) + (forth - back))
+                (hi, (p_lo - m_lo) + rounding)
             },
         )
+    }
+
+    /// What the low parts of `a` and of `b` add to [`Double::cross`].
+    #[inline(always)]
+    fn add_low_parts(&mut self, a: &Self, b: &Self) {
+        for i in 0..3 {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let (forth, back) = (a.hi[j] * b.lo[k] + a.lo[j] * b.hi[k], a.hi[k] * b.lo[j] + a.lo[k] * b.hi[j]);
+            self.lo[i] += forth - back;
+        }
     }
 
     #[inline(always)]
@@ -166,6 +154,11 @@ impl<S: Simd> Double<S> {
 }
 
 #[inline(always)]
+fn minus<S: Simd>(a: &Vectors<S>, b: &Vectors<S>) -> Vectors<S> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
 fn cross<S: Simd>(a: &Vectors<S>, b: &Vectors<S>) -> Vectors<S> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
@@ -183,16 +176,17 @@ fn largest<S: Simd>(v: &Vectors<S>) -> f64x8<S> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{DIMENSION, setting};
+    use super::super::tests::{DIMENSION, fast_path, setting};
+    use super::super::{has_plain_edges, largest};
     use super::*;
+    use crate::Ray;
     use crate::bvh::Level;
+    use crate::kernel::bound::TRIANGLE_CONDITION;
     use crate::kernel::search::each;
-    use crate::kernel::tally::Tally;
-    use crate::{Interval, Ray};
     use fearless_simd::dispatch;
     use glam::DVec3;
 
-    type Case = (Ray, [DVec3; 3], Interval);
+    type Case = (Ray, [DVec3; 3]);
 
     #[inline(always)]
     fn gathered<S: Simd>(simd: S, cases: &[Case]) -> Rays<S> {
@@ -200,91 +194,78 @@ mod tests {
             |f: &dyn Fn(&Case) -> f64| -> f64x8<S> { [0, 1, 2, 3, 4, 5, 6, 7].map(|i| f(&cases[i])).simd_into(simd) };
         let vectors = |f: &dyn Fn(&Case) -> DVec3| [0, 1, 2].map(|axis| number(&|case| f(case)[axis]));
         Rays {
-            origin: vectors(&|(ray, ..)| ray.origin),
-            direction: vectors(&|(ray, ..)| ray.direction),
-            vertices: [0, 1, 2].map(|i| vectors(&|(_, t, _)| t[i])),
-            within: [number(&|(.., within)| within.min), number(&|(.., within)| within.max)],
+            origin: vectors(&|(ray, _)| ray.origin),
+            direction: vectors(&|(ray, _)| ray.direction),
+            vertices: [0, 1, 2].map(|i| vectors(&|(_, t)| t[i])),
         }
     }
 
-    /// Hits, and rays left to the scalar function.
-    fn compare(cases: &[Case; 8]) -> [u32; 2] {
-        let alone = cases.map(|(ray, t, within)| {
-            let before = Tally::now();
-            let hit = super::super::intersect(&ray, &t, within);
-            (hit, Tally::now().since(before).refined > 0)
-        });
+    /// Hits that were known, with plain edges, and left to the scalar function.
+    fn compare(cases: &[Case; 8]) -> [u32; 3] {
+        let alone = cases.map(|(ray, t)| fast_path(&ray, &t));
+        let sizes = cases.map(|(ray, t)| [largest(ray.direction), largest(ray.origin - t[0])]);
+        let least = [0, 1].map(|i| sizes.iter().fold(0.0, |most, size| size[i].max(most)) / TRIANGLE_CONDITION);
+        let (plain, mut seen) = (cases.iter().all(|(_, t)| has_plain_edges(t)), [0; 3]);
         for (level, detected) in Level::all() {
-            dispatch!(detected.token(), simd => {
-                let eight = intersect(simd, &gathered(simd, cases));
-                for (i, (hit, unsure)) in alone.into_iter().enumerate() {
-                    let of = |x: f64x8<_>| x[i].to_bits();
-                    assert_eq!(eight.unsure >> i & 1 == 1, unsure, "{level}: {:?}", cases[i]);
-                    assert_eq!(eight.hit >> i & 1 == 1, hit.is_some() && !unsure, "{level}: {:?}", cases[i]);
-                    if let (Some(hit), false) = (hit, unsure) {
-                        let same = [of(eight.lambda), of(eight.error), of(eight.uv[0]), of(eight.uv[1])];
-                        let alone = [hit.lambda, hit.error, hit.uv.x, hit.uv.y].map(f64::to_bits);
-                        assert_eq!(same, alone, "{level}: {:?}", cases[i]);
+            for plain in [false, plain] {
+                dispatch!(detected.token(), simd => {
+                    let eight = passed(simd, &gathered(simd, cases), plain, least);
+                    seen = [0, 0, 8 - (eight.known & 0xff).count_ones()];
+                    for (i, hit) in alone.iter().enumerate() {
+                        let (of, known) = (|x: f64x8<_>| x[i].to_bits(), eight.known >> i & 1 == 1);
+                        if let (Some(hit), true) = (hit, known) {
+                            let same = [of(eight.lambda), of(eight.error), of(eight.uv[0]), of(eight.uv[1])];
+                            let alone = [hit.lambda, hit.error, hit.uv.x, hit.uv.y].map(f64::to_bits);
+                            assert_eq!(same, alone, "{level}: {:?}", cases[i]);
+                            seen = [seen[0] + 1, seen[1] + u32::from(plain), seen[2]];
+                        }
                     }
-                }
-                assert!((eight.hit | eight.unsure) < 256);
-            });
+                    assert!(eight.known < 256);
+                });
+            }
         }
-        alone
-            .iter()
-            .fold([0; 2], |[hits, left], (hit, unsure)| [hits + u32::from(hit.is_some()), left + u32::from(*unsure)])
+        seen
     }
 
-    /// Ordinary and hard triangles; ties; ends of the interval at λ or an ulp beside it; numbers that leave the range.
+    /// Ordinary and hard triangles, and numbers that leave the range.
     #[test]
     fn eight_answer_as_one_does_to_the_bit() {
-        let (mut cases, mut seen) = (Vec::new(), [0; 3]);
-        each(40_000, DIMENSION + 3, |x| {
+        let (mut cases, mut rays, mut seen) = (Vec::new(), 0, [0; 3]);
+        each(40_000, DIMENSION + 2, |x| {
             let (mut ray, mut t) = setting(x);
             let (kind, scale) = ((12.0 * x[DIMENSION].abs()) as u32, x[DIMENSION + 1]);
             let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
-            let grid = |v: DVec3| (v * 16.0).round() / 8.0;
+            let short = rays / 8 % 2 == 0;
             match kind {
-                0..=5 => {
-                    (t, ray.origin) = ([v(0), v(3), v(6)], 5.0 * v(9));
-                    ray.direction = t[0] + x[12].abs() * (t[1] - t[0]) + 0.4 * (t[2] - t[0]) - ray.origin;
-                }
-                6 => {
-                    t = t.map(grid);
-                    ray = Ray { origin: grid(ray.origin), direction: t[0] + 0.25 * (t[1] - t[0]) - grid(ray.origin) };
-                }
-                7 => {
+                7 if !short => {
                     let factor = 2f64.powf(1000.0 * scale);
                     (t, ray) = (t.map(|v| v * factor), Ray { origin: ray.origin * factor, ..ray });
                 }
-                8 => ray.direction *= 2f64.powf(1020.0 * scale),
-                9 if scale > 0.8 => {
+                8 if !short => ray.direction *= 2f64.powf(1020.0 * scale),
+                9 if !short && scale > 0.8 => {
                     let odd = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0];
                     let at = (1e6 * scale) as usize;
                     let [a, b, c] = &mut t;
                     let v = [a, b, c, &mut ray.origin, &mut ray.direction];
                     v.into_iter().nth(at % 5).unwrap()[at / 5 % 3] = odd[at / 15 % 4];
                 }
-                _ => {}
+                10.. if !short => {}
+                _ => {
+                    (t, ray.origin) = ([v(0), v(3), v(6)], 5.0 * v(9));
+                    t = t.map(|v| if short { v.as_vec3().as_dvec3() } else { v });
+                    ray.direction = t[0] + 0.5 * x[12].abs() * (t[1] - t[0]) + 0.4 * (t[2] - t[0]) - ray.origin;
+                }
             }
-            let lambda = super::super::intersect(&ray, &t, Interval::LINE).map_or(0.0, |hit| hit.lambda);
-            let within = match (8.0 * x[DIMENSION + 2].abs()) as u32 {
-                0 => Interval { min: lambda, ..Interval::LINE },
-                1 => Interval { min: lambda.next_down(), max: lambda.next_up() },
-                2 => Interval { max: lambda * (1.0 - 1e-15), ..Interval::LINE },
-                3 => Interval { max: f64::NAN, ..Interval::LINE },
-                4 => Interval::FORWARD,
-                _ => Interval::LINE,
-            };
-            cases.push((ray, t, within));
+            rays += 1;
+            cases.push((ray, t));
             if cases.len() == 8 {
-                let [hits, unsure] = compare(cases.as_array().expect("eight"));
-                seen = [seen[0] + 8, seen[1] + hits, seen[2] + unsure];
+                let of_eight = compare(cases.as_array().expect("eight"));
+                seen = [0, 1, 2].map(|i| seen[i] + of_eight[i]);
                 cases.clear();
             }
         });
-        let [rays, hits, unsure] = seen;
-        println!("triangle, eight at once: {rays} rays, {hits} hits, {unsure} left to the scalar function");
-        assert!(hits * 5 > rays && unsure * 10 > rays && unsure * 4 < rays * 3);
+        let [known, plain, left] = seen;
+        println!("triangle, eight at once: {rays} rays, {known} hits known, {plain} with plain edges; {left} left");
+        assert!(known * 2 > rays && plain * 5 > rays && left * 50 > rays);
     }
 }

@@ -16,7 +16,7 @@ use crate::kernel::number::{self, Number, cross, difference, dot, vector};
 use crate::kernel::ratio::{self, Ratio};
 use crate::kernel::tally;
 use crate::{Hit, Interval, Ray};
-use fearless_simd::Simd;
+use fearless_simd::{Simd, f64x4};
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
 use std::hint::black_box;
@@ -50,7 +50,7 @@ pub fn intersect_with<P: Product>(ray: &Ray, vertices: &[DVec3; 3], within: Inte
 
 #[inline(always)]
 fn fast<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3; 3], within: &Interval) -> Option<Hit> {
-    let products = Products::<P>::new::<true>(cpu, ray, vertices, false);
+    let products = Products::<P>::new::<true>(cpu, ray, vertices.map(|v| P::Lanes::of(cpu, v)), false);
     let &Products { det, su, sv, ref sizes, .. } = &products;
     let uncertain = || closely(ray, vertices, within);
     if !sizes.are_ordinary() {
@@ -91,13 +91,21 @@ fn agreement(u: f64, v: f64, w: f64) -> f64 {
 
 /// The hit of a ray that a mesh's filter has proved to meet the triangle at a λ that counts, to the bit as [`intersect_with`] has it; `None` where
 /// that would leave its fast path. That the edge functions would satisfy it follows from the margins of the filter and of this file:
-/// docs/numerics.md §4. `plain`: b − a and c − a are vectors of floats. For code that was dispatched to the instructions of `simd`.
+/// docs/numerics.md §4. `plain`: b − a and c − a are vectors of floats. `least`: that |D| and |N| are large enough if they are above
+/// these, where the filter knows it; else their sizes are found here. For code that was dispatched to the instructions of `simd`.
 #[inline(always)]
 #[must_use]
-pub fn passed<S: Simd>(simd: S, ray: &Ray, vertices: &[DVec3; 3], plain: bool) -> Option<Hit> {
+pub fn passed<S: Simd>(
+    simd: S,
+    ray: &Ray,
+    vertices: [f64x4<S>; 3],
+    plain: bool,
+    least: Option<[f64; 2]>,
+) -> Option<Hit> {
+    let vertices = [vertices[0].into(), vertices[1].into(), vertices[2].into()];
     match cpu::fused_lanes_of(simd) {
-        Some(cpu) => hit_of_passed::<Fused>(cpu, ray, vertices, plain),
-        None => hit_of_passed::<Split>((), ray, vertices, plain),
+        Some(cpu) => hit_of_passed::<Fused>(cpu, ray, &vertices, plain, least),
+        None => hit_of_passed::<Split>((), ray, &vertices, plain, least),
     }
 }
 
@@ -105,14 +113,20 @@ pub fn passed<S: Simd>(simd: S, ray: &Ray, vertices: &[DVec3; 3], plain: bool) -
 fn hit_of_passed<P: Product>(
     cpu: <P::Lanes as Lanes>::Cpu,
     ray: &Ray,
-    vertices: &[DVec3; 3],
+    [a, b, c]: &[[f64; 4]; 3],
     plain: bool,
+    least: Option<[f64; 2]>,
 ) -> Option<Hit> {
+    let vertices = [P::Lanes::new(cpu, *a), P::Lanes::new(cpu, *b), P::Lanes::new(cpu, *c)];
     let products = Products::<P>::new::<false>(cpu, ray, vertices, plain);
-    let bound = TRIANGLE_SIDES * products.sizes.of_sides() + VANISHED;
     let inverse = 1.0 / products.det;
-    let certain = products.sizes.are_ordinary() & (bound * inverse.abs() <= WEIGHT);
-    (certain && products.are_known()).then(|| products.hit(inverse))
+    let known = if let Some([of_det, of_height]) = least {
+        (products.det.abs() > of_det) & (products.height.abs() > of_height)
+    } else {
+        let bound = TRIANGLE_SIDES * products.sizes.of_sides() + VANISHED;
+        products.sizes.are_ordinary() & (bound * inverse.abs() <= WEIGHT) && products.are_known()
+    };
+    known.then(|| products.hit(inverse))
 }
 
 /// Whether b − a and c − a are vectors of floats.
@@ -140,17 +154,21 @@ impl<P: Product> Products<P> {
     /// `DECIDE`: there will be a branch on them. What n is made of would be kept in memory till after it, and takes longer
     /// there than n's low part does now.
     #[inline(always)]
-    fn new<const DECIDE: bool>(cpu: <P::Lanes as Lanes>::Cpu, ray: &Ray, vertices: &[DVec3; 3], plain: bool) -> Self {
+    fn new<const DECIDE: bool>(
+        cpu: <P::Lanes as Lanes>::Cpu,
+        ray: &Ray,
+        [a, b, c]: [P::Lanes; 3],
+        plain: bool,
+    ) -> Self {
         // u·e₁ + v·e₂ − λ·d = s. Crossing leaves components turned: what is multiplied with n is turned as n is.
-        let (lanes, turned_back) = (|v: DVec3| P::Lanes::of(cpu, v), |v: DVec3| P::Lanes::turned_back(cpu, v));
-        let ([a, b, c], (o, d)) = (vertices.map(lanes), (turned_back(ray.origin), turned_back(ray.direction)));
+        let (o, d) = (P::Lanes::turned_back(cpu, ray.origin), P::Lanes::turned_back(cpu, ray.direction));
         let (e1, e2, s) =
-            (Double::difference(b, a), Double::difference(c, a), Double::difference(o, turned_back(vertices[0])));
+            (Double::difference(b, a), Double::difference(c, a), Double::difference(o, a.turned().turned()));
         let n = e1.cross_turned_back(e2, plain);
         let n = if DECIDE { Double { hi: n.hi, lo: black_box(n.lo) } } else { n };
         let (nd, ns) = (n.times_float(d), n.times(s));
         // (y, z, x), as the edges are turned for n.
-        let q = d * s.hi.turned() - lanes(ray.direction) * s.hi;
+        let q = d * s.hi.turned() - P::Lanes::of(cpu, ray.direction) * s.hi;
         let ([z, x, y], [v, w, u]) = (nd.hi.rows(ns.hi), (q * e2.hi.turned()).rows(q * e1.hi.turned()));
         let (xy, rounding) = two_sum(d.joined(x, u), d.joined(y, v));
         let (forms, more_rounding) = two_sum(xy, d.joined(z, w));

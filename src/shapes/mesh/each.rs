@@ -371,7 +371,7 @@ impl Walk<'_, Nearests<'_>> {
         }
         let remembered =
             Remembered { which: remembered & !settled, spots: spot.as_flattened(), ids: id.as_flattened() };
-        settle(simd, self.mesh, self.rays, remembered, self.answers.hits);
+        settle(simd, self.mesh, self.rays, &self.margins, remembered, self.answers.hits);
     }
 }
 

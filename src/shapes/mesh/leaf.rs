@@ -108,7 +108,7 @@ impl Spot {
 pub(super) struct Probe {
     origin: [f32; 4],
     direction: [f32; 4],
-    margins: Margins,
+    pub(super) margins: Margins,
     pub(super) t_min: f32,
     /// No hit has a t above this in absolute value.
     reach: f32,
@@ -122,10 +122,10 @@ pub(super) struct Margins {
     /// Of the edge functions: size·(`edge` + size·`edge2`).
     edge: f32,
     edge2: f32,
-    /// Of t's numerator for the place of v₀ − o: |n|·`place`, and size²·`place` times a few ε once more.
-    place: f32,
     /// Of t's denominator: size²·`det`.
     det: f32,
+    /// Of t's numerator for the place of v₀ − o: |n|·`place`, and size²·`place` times a few ε once more.
+    place: f32,
 }
 
 /// The longest way to a triangle along one axis, from an origin with the largest coordinate `size`; its error as if it
@@ -323,6 +323,12 @@ impl<S: Simd> OfEight<S> {
 }
 
 impl Margins {
+    /// Not below the largest coordinates of d and of s = o − v, in the frame and in units of ε.
+    #[inline(always)]
+    pub(super) fn sizes(&self) -> [f32; 2] {
+        [self.det, self.place]
+    }
+
     /// Of every ray of a bundle, and the t beyond which, either way, none has a hit.
     pub(super) fn of_bundle(bundle: &Bundle) -> (Self, f32) {
         let steps = steps(bundle.size, bundle.origin_error);
@@ -429,6 +435,6 @@ pub(super) fn cross<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
 }
 
 #[inline(always)]
-fn column(rows: &[[f32; 8]; 3], lane: usize) -> DVec3 {
+pub(super) fn column(rows: &[[f32; 8]; 3], lane: usize) -> DVec3 {
     DVec3::new(f64::from(rows[0][lane]), f64::from(rows[1][lane]), f64::from(rows[2][lane]))
 }

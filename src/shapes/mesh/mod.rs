@@ -45,6 +45,8 @@ pub struct Mesh {
     leaves: Vec<Leaf>,
     /// The leaves hold the vertices themselves, not rounded ones.
     exact: bool,
+    /// The frame's unit as [`settle`] counts with it.
+    unit: f64,
     level: Level,
 }
 
@@ -105,7 +107,9 @@ impl Mesh {
         let level = Level::detect();
         let built = build::build(&positions, &triangles, &used, level, watch);
         let Some(Built { tree, leaves, exact, bounds }) = built else { return Err(InvalidShape::Cancelled) };
-        Ok(Self { positions, triangles, normals: Vec::new(), uvs: Vec::new(), bounds, tree, leaves, exact, level })
+        let unit = settle::unit(&tree.frame);
+        let (normals, uvs) = (Vec::new(), Vec::new());
+        Ok(Self { positions, triangles, normals, uvs, bounds, tree, leaves, exact, unit, level })
     }
 
     /// With a shading normal for each position, of any length; they are interpolated over the triangles, and where

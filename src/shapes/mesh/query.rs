@@ -2,6 +2,7 @@
 
 use super::Mesh;
 use super::leaf::{Leaf, Outcome, Probe, Spot, UNCERTIFIED};
+use super::settle::settle_one;
 use crate::bvh::{self, Lanes, Limits, LocalRay, Sure};
 use crate::kernel::eft::{Fused, Split};
 use crate::kernel::{cpu, tally, textbook, triangle};
@@ -94,7 +95,8 @@ fn closest_along<S: Simd, const FORWARD: bool>(simd: S, asked: &Asked, local: &L
         nearest: Nearest::new(mesh, ray, asked.within(), local.limits, local.sure, local.t_max),
     };
     bvh::closest(simd, &mesh.tree, &Lanes::<S, FORWARD>::new(simd, local), local.t_max, &mut walk);
-    walk.nearest.settle(simd)
+    let probe = if FORWARD { Some(&walk.probe) } else { None };
+    walk.nearest.settle(simd, probe)
 }
 
 /// Whether anything is hit.
@@ -219,12 +221,18 @@ impl<'a> Nearest<'a> {
         Self { mesh, ray, within, limits, sure, t_max, passed, count: 0, best: None }
     }
 
-    /// The answer.
+    /// The answer. `probe`: of a ray that is taken as it is.
     #[inline(always)]
-    fn settle<S: Simd>(&mut self, simd: S) -> Option<Hit> {
+    fn settle<S: Simd>(&mut self, simd: S, probe: Option<&Probe>) -> Option<Hit> {
         match (self.count, self.best.is_some()) {
             (0, false) => None,
-            (1, false) => self.passed(simd, self.passed[0].spot),
+            (1, false) => {
+                let spot = self.passed[0].spot;
+                match settle_one(simd, self.mesh, self.ray, spot, probe) {
+                    Some(hit) => Some(hit),
+                    None => self.exactly_apart(simd, spot),
+                }
+            }
             _ => {
                 self.decide(simd);
                 self.best
@@ -260,17 +268,6 @@ impl<'a> Nearest<'a> {
             if t <= self.t_max {
                 self.confirm(simd, spot);
             }
-        }
-    }
-
-    /// The hit of a triangle that is certainly hit.
-    #[inline(always)]
-    fn passed<S: Simd>(&self, simd: S, spot: Spot) -> Option<Hit> {
-        let (leaf, lane) = spot.at(self.mesh);
-        let vertices = leaf.vertices(lane, self.mesh);
-        match triangle::passed(simd, self.ray, &vertices, leaf.has_plain_edges(lane)) {
-            Some(hit) if !UNCERTIFIED => Some(Hit { part: leaf.number(lane), ..hit }),
-            _ => self.exactly_apart(simd, spot),
         }
     }
 
