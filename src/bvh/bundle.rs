@@ -62,7 +62,6 @@ pub(crate) struct Sixteen {
     near_shift: [[f32; 16]; 3],
     far_shift: [[f32; 16]; 3],
     pub(crate) t_min: [f32; 16],
-    /// −∞ for a ray that has its answer.
     pub(crate) t_max: [f32; 16],
     /// What lies between these is certainly inside the ray's interval.
     sure_min: [f32; 16],
@@ -233,6 +232,8 @@ pub(crate) struct Bundle {
     away: u32,
     /// On some axis they are not all of one sign.
     mixed: bool,
+    /// Bit i: ray i wants to know more.
+    pub(crate) asking: u32,
     /// The end of the origins' range that is nearest to a plane in front, by axis, and the farthest.
     near_origin: [f32; 3],
     far_origin: [f32; 3],
@@ -273,6 +274,7 @@ impl Bundle {
         place: None,
         away: 0,
         mixed: false,
+        asking: 0,
         near_origin: [FAR; 3],
         far_origin: [-FAR; 3],
         directions: [[0.0; 3]; 2],
@@ -284,18 +286,19 @@ impl Bundle {
         origin_error: 0.0,
     };
 
-    /// Makes these rays the bundle's, instead of all others. `false`, and no use, if the rays go very different ways, if one of
-    /// them is not taken as it is by [`LocalRay::new`](super::LocalRay::new), or if an interval is empty; from the end,
-    /// if that is not one place.
+    /// Makes these rays the bundle's, instead of all others; only the first `many` want to know something. `false`, and no use, if
+    /// the rays go very different ways, if one of them is not taken as it is by [`LocalRay::new`](super::LocalRay::new), or if an
+    /// interval is empty; from the end, if that is not one place.
     #[inline(always)]
     pub(crate) fn take<S: Simd>(
         &mut self,
         simd: S,
         frame: &Frame,
         rays: &[(Ray, Interval); RAYS],
+        many: usize,
         from: Start,
     ) -> bool {
-        (self.away, self.mixed) = (0, false);
+        (self.away, self.mixed, self.asking) = (0, false, u32::MAX >> (RAYS - many));
         (self.near_origin, self.far_origin) = ([FAR; 3], [-FAR; 3]);
         self.inverse = [[1.0; 3]; 2];
         // No closures over vectors here and below: one that is not inlined makes calls of all that it does.
@@ -372,12 +375,6 @@ impl Bundle {
             return a.meet_mixed(simd, node, lane) | b.meet_mixed(simd, node, lane) << 16;
         }
         a.meet(simd, node, lane, near) | b.meet(simd, node, lane, near) << 16
-    }
-
-    /// The ray has its answer.
-    #[inline(always)]
-    pub(crate) fn end(&mut self, ray: usize) {
-        self.rays[ray / 16 % SIXTEENS].t_max[ray % 16] = f32::NEG_INFINITY;
     }
 
     /// Keeps the largest t that matters, after one of the rays' has changed.
@@ -458,7 +455,7 @@ pub(crate) fn together<S: Simd>(simd: S, tree: &Wide, walk: &mut impl Together<S
                 continue;
             }
             let (node, lane) = (&nodes[node as usize], lane_of(key));
-            let rays = bundle.meet(simd, node, lane, &bounds.near);
+            let rays = bundle.meet(simd, node, lane, &bounds.near) & bundle.asking;
             if rays == 0 {
                 continue;
             }

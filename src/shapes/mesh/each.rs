@@ -2,7 +2,7 @@
 //! are those of each ray alone.
 
 use super::Mesh;
-use super::leaf::{Margins, OfEight, Spot, filter};
+use super::leaf::{Margins, Spot, Verdict, filter};
 use super::query::{self, exactly, nearer, occluded};
 use super::seen::{OfSixteen, Seen, View, everywhere};
 use super::settle::{Remembered, settle};
@@ -20,7 +20,7 @@ pub(super) fn closest(mesh: &Mesh, rays: &[Stretch], hits: &mut [Option<Hit>]) {
     each(
         rays,
         hits,
-        |rays, hits| dispatch!(mesh.level.of_many(), simd => closest_with(simd, mesh, rays, &mut bundle, hits)),
+        |rays, many, hits| dispatch!(mesh.level.of_many(), simd => closest_with(simd, mesh, rays, many, &mut bundle, hits)),
         go_together,
         |(ray, within), hit| query::find_closest(mesh, ray, *within, hit),
     );
@@ -32,18 +32,18 @@ pub(super) fn any(mesh: &Mesh, rays: &[Stretch], hits: &mut [bool]) {
     each(
         rays,
         hits,
-        |rays, hits| dispatch!(mesh.level.of_many(), simd => any_with(simd, mesh, rays, &mut bundle, hits)),
+        |rays, many, hits| dispatch!(mesh.level.of_many(), simd => any_with(simd, mesh, rays, many, &mut bundle, hits)),
         |rays| go_together(rays) || end_together(rays),
         |(ray, within), hit| *hit = query::any(mesh, ray, *within),
     );
 }
 
-/// A bundle at a time by `together`, which may refuse, the others one by one. After a refusal bundles are tried ever more
+/// A bundle at a time by `together`, which is told how many rays count and may refuse, the others one by one. After a refusal bundles are tried ever more
 /// seldom, so that rays without any order cost no more than alone. What is left of the slice is tried if it `may` be a bundle.
 fn each<T: Copy + Default>(
     rays: &[Stretch],
     hits: &mut [T],
-    mut together: impl FnMut(&[Stretch; RAYS], &mut [T; RAYS]) -> bool,
+    mut together: impl FnMut(&[Stretch; RAYS], usize, &mut [T; RAYS]) -> bool,
     may: impl Fn(&[Stretch]) -> bool,
     alone: impl Fn(&Stretch, &mut T),
 ) {
@@ -54,7 +54,7 @@ fn each<T: Copy + Default>(
     for (rays, hits) in bundles.iter().zip(of_bundles) {
         if wait > 0 {
             wait -= 1;
-        } else if together(rays, hits) {
+        } else if together(rays, RAYS, hits) {
             patience = 0;
             continue;
         } else {
@@ -65,11 +65,12 @@ fn each<T: Copy + Default>(
             alone(ray, hit);
         }
     }
-    if rest.len() >= FEWEST && wait == 0 && may(rest) {
+    // The first two before all others: farther on memory would have to be waited for.
+    if rest.len() >= FEWEST && wait == 0 && is_near(rest[0].0.direction, rest[1].0.direction) && may(rest) {
         // The last of them stands for those that are not there.
         let (mut rays, mut answers) = ([rest[rest.len() - 1]; RAYS], [T::default(); RAYS]);
         rays[..rest.len()].copy_from_slice(rest);
-        if together(&rays, &mut answers) {
+        if together(&rays, rest.len(), &mut answers) {
             of_rest.copy_from_slice(&answers[..rest.len()]);
             return;
         }
@@ -128,6 +129,9 @@ trait Answers<S: Simd>: Sized {
     /// Considers a triangle for one ray, which may pass it between the t of `depth`; `through`: certainly passes through its
     /// inside. `true` if the ray needs no more.
     fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, depth: [f32; 2]) -> bool;
+
+    /// Keeps the bundle's t_max, after a leaf.
+    fn shorten(simd: S, bundle: &mut Bundle);
 }
 
 impl<'a, A> Walk<'a, A> {
@@ -142,7 +146,7 @@ impl<'a, A> Walk<'a, A> {
         Self { mesh, rays, view: View::of(bundle), bundle, margins, answers }
     }
 
-    /// Rays from one place: many triangle by triangle, few one by one.
+    /// Rays from one place: many triangle by triangle, few two by two.
     #[inline(always)]
     fn visit_from<S: Simd>(&mut self, simd: S, view: &View, number: u32, mut rays: u32)
     where
@@ -152,11 +156,17 @@ impl<'a, A> Walk<'a, A> {
         let seen = Seen::new(simd, &triangles, view, &self.margins);
         let mut lanes = if rays.count_ones() <= FEW { 0xff } else { seen.lanes(simd, view) };
         if rays.count_ones() <= lanes.count_ones() * SIXTEENS as u32 {
+            let seen = seen.twice();
             while rays != 0 {
-                let ray = rays.trailing_zeros() as usize % RAYS;
-                rays &= rays - 1;
-                if let Some(verdict) = seen.ray(simd, &self.bundle.rays[ray / 16], ray % 16) {
-                    self.of_ray(simd, number, ray, &verdict);
+                let others = rays & (rays - 1);
+                let two = [rays.trailing_zeros() as usize, others.trailing_zeros() as usize % RAYS];
+                let mut sighting = seen.by_two(simd, &self.bundle.rays, two);
+                if others == 0 {
+                    sighting.maybe &= 0xff;
+                }
+                rays = others & others.wrapping_sub(1);
+                if sighting.maybe != 0 {
+                    self.of_rays(simd, number, two, &sighting.verdict(simd));
                 }
             }
             return;
@@ -165,8 +175,8 @@ impl<'a, A> Walk<'a, A> {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
             let [a, b] = &self.bundle.rays;
-            let (mut first, mut second) =
-                (seen.triangle(simd, lane as usize, a), seen.triangle(simd, lane as usize, b));
+            let one = seen.one(simd, lane as usize);
+            let (mut first, mut second) = (one.by(simd, a), one.by(simd, b));
             (first.maybe, second.maybe) = (first.maybe & rays, second.maybe & rays >> 16);
             if first.maybe | second.maybe == 0 {
                 continue;
@@ -191,31 +201,34 @@ impl<'a, A> Walk<'a, A> {
             let [o, d] = [everywhere(simd, &sixteen.origin, at), everywhere(simd, &sixteen.direction, at)];
             let stretch = [f32x8::splat(simd, sixteen.t_min[at]), f32x8::splat(simd, sixteen.t_max[at])];
             if let Some(verdict) = filter(simd, &triangles, [o, d], &self.margins, stretch) {
-                self.of_ray(simd, number, ray, &verdict);
+                self.of_rays(simd, number, [ray; 2], &verdict);
             }
         }
     }
 
-    /// What one ray meets in a leaf.
+    /// What a ray meets in a leaf, or two: the first in the verdict's first eight lanes.
     #[inline(always)]
-    fn of_ray<S: Simd>(&mut self, simd: S, leaf: u32, ray: usize, verdict: &OfEight<S>)
+    fn of_rays<S, V, M>(&mut self, simd: S, leaf: u32, rays: [usize; 2], verdict: &Verdict<V, M>)
     where
+        S: Simd,
+        V: SimdFloat<S, Element = f32, Mask = M>,
+        M: SimdMask<S>,
         A: Answers<S>,
     {
-        let outcome = verdict.outcome();
-        let mut lanes = outcome.maybe;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros();
-            lanes &= lanes - 1;
-            let (through, depth) = (outcome.through >> lane & 1 == 1, outcome.depths.interval(lane as usize));
-            if A::of_one(self, simd, Spot { leaf, lane }, ray, through, depth) {
-                break;
+        let through = verdict.through.to_bitmask();
+        let mut maybe = verdict.maybe;
+        while maybe != 0 {
+            let at = maybe.trailing_zeros() as usize % V::LEN;
+            maybe &= maybe - 1;
+            let (spot, depth) = (Spot { leaf, lane: at as u32 % 8 }, [verdict.low[at], verdict.high[at]]);
+            if A::of_one(self, simd, spot, rays[at / 8 % 2], through >> at & 1 == 1, depth) {
+                maybe &= !(0xff << (at & 8));
             }
         }
     }
 }
 
-/// With as many rays, or fewer, a leaf is tested ray by ray.
+/// As many rays, or fewer, are tested with all of a leaf's triangles.
 const FEW: u32 = 4;
 
 impl<S: Simd, A: Answers<S>> bvh::Together<S> for Walk<'_, A> {
@@ -233,7 +246,7 @@ impl<S: Simd, A: Answers<S>> bvh::Together<S> for Walk<'_, A> {
                     Some(view) => self.visit_from(simd, &view, leaf, rays),
                     None => self.visit(simd, leaf, rays),
                 }
-                self.bundle.shorten(simd);
+                A::shorten(simd, self.bundle);
             },
         );
     }
@@ -245,6 +258,7 @@ fn closest_with<S: Simd>(
     simd: S,
     mesh: &Mesh,
     rays: &[Stretch; RAYS],
+    many: usize,
     bundle: &mut Option<Bundle>,
     hits: &mut [Option<Hit>; RAYS],
 ) -> bool {
@@ -252,7 +266,7 @@ fn closest_with<S: Simd>(
         return false;
     }
     let bundle = bundle.get_or_insert_with(|| Bundle::EMPTY);
-    if !bundle.take(simd, mesh.frame(), rays, Start::Origin) {
+    if !bundle.take(simd, mesh.frame(), rays, many, Start::Origin) {
         return false;
     }
     *hits = [None; RAYS];
@@ -332,6 +346,11 @@ impl<S: Simd> Answers<S> for Nearests<'_> {
         }
         false
     }
+
+    #[inline(always)]
+    fn shorten(simd: S, bundle: &mut Bundle) {
+        bundle.shorten(simd);
+    }
 }
 
 impl Walk<'_, Nearests<'_>> {
@@ -381,6 +400,7 @@ fn any_with<S: Simd>(
     simd: S,
     mesh: &Mesh,
     rays: &[Stretch; RAYS],
+    many: usize,
     bundle: &mut Option<Bundle>,
     hits: &mut [bool; RAYS],
 ) -> bool {
@@ -390,22 +410,23 @@ fn any_with<S: Simd>(
     }
     let bundle = bundle.get_or_insert_with(|| Bundle::EMPTY);
     // Rays to a light, from the light; t is then `max` − λ.
-    let from_end = to_one_place && bundle.take(simd, mesh.frame(), rays, Start::End);
-    if !(from_end || alike && bundle.take(simd, mesh.frame(), rays, Start::Origin)) {
+    let from_end = to_one_place && bundle.take(simd, mesh.frame(), rays, many, Start::End);
+    if !(from_end || alike && bundle.take(simd, mesh.frame(), rays, many, Start::Origin)) {
         return false;
     }
-    *hits = [false; RAYS];
-    let mut walk = Walk::new(simd, mesh, rays, bundle, Until { hits });
+    let mut walk = Walk::new(simd, mesh, rays, bundle, Until);
     bvh::together(simd, &mesh.tree, &mut walk);
+    let asking = walk.bundle.asking;
+    for (ray, hit) in hits.iter_mut().enumerate() {
+        *hit = asking >> ray & 1 == 0;
+    }
     true
 }
 
 /// The search until all rays are known to hit something.
-struct Until<'a> {
-    hits: &'a mut [bool; RAYS],
-}
+struct Until;
 
-impl<S: Simd> Answers<S> for Until<'_> {
+impl<S: Simd> Answers<S> for Until {
     #[inline(always)]
     fn of_sixteen(walk: &mut Walk<Self>, simd: S, spot: Spot, sixteen: usize, verdict: &OfSixteen<S>) -> u32 {
         let rays = &walk.bundle.rays[sixteen];
@@ -419,12 +440,7 @@ impl<S: Simd> Answers<S> for Until<'_> {
                 met |= 1 << lane;
             }
         }
-        let mut answered = met;
-        while answered != 0 {
-            let lane = answered.trailing_zeros() as usize;
-            answered &= answered - 1;
-            walk.end(16 * sixteen + lane);
-        }
+        walk.end(met << (16 * sixteen));
         met
     }
 
@@ -432,13 +448,20 @@ impl<S: Simd> Answers<S> for Until<'_> {
     fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, depth: [f32; 2]) -> bool {
         let met = through & walk.bundle.rays[ray / 16].holds(ray % 16, depth) || walk.meets(simd, spot, ray);
         if met {
-            walk.end(ray);
+            walk.end(1 << ray);
         }
         met
     }
+
+    #[inline(always)]
+    fn shorten(_: S, bundle: &mut Bundle) {
+        if bundle.asking == 0 {
+            bundle.t_max = f32::NEG_INFINITY;
+        }
+    }
 }
 
-impl Walk<'_, Until<'_>> {
+impl Walk<'_, Until> {
     #[inline(always)]
     fn meets<S: Simd>(&self, simd: S, spot: Spot, ray: usize) -> bool {
         let (ref asked, within) = self.rays[ray % RAYS];
@@ -446,10 +469,9 @@ impl Walk<'_, Until<'_>> {
         occluded(simd, self.mesh, asked, within, leaf, lane)
     }
 
-    /// The ray has its answer.
+    /// These rays have their answers.
     #[inline(always)]
-    fn end(&mut self, ray: usize) {
-        self.answers.hits[ray % RAYS] = true;
-        self.bundle.end(ray);
+    fn end(&mut self, rays: u32) {
+        self.bundle.asking &= !rays;
     }
 }

@@ -3,8 +3,8 @@
 //! Edge functions, denominator and numerator of t are linear in the direction, with coefficients that are the same for all rays:
 //! U = (e₂ × C)·d, V = (C × e₁)·d, det = (e₁ × e₂)·d. The bounds on their errors are those of the filter: docs/numerics.md §10.
 
-use super::leaf::{Margins, OfEight, Sides, Sighting, Triangles, Vec8, Verdict, cross, dot, minus, splat, three};
-use crate::bvh::{Bundle, E, Sixteen};
+use super::leaf::{Margins, Sides, Sighting, Triangles, Vec8, Verdict, cross, dot, minus, splat, three};
+use crate::bvh::{Bundle, E, SIXTEENS, Sixteen};
 use fearless_simd::{Simd, f32x8, f32x16, mask32x16, prelude::*};
 
 /// Whence, and whither.
@@ -33,19 +33,19 @@ impl View {
 }
 
 /// Triangles by lane: coefficients of the direction, t's numerator, and margins.
-pub(super) struct Seen<S: Simd> {
-    u: Vec8<S>,
-    v: Vec8<S>,
-    det: Vec8<S>,
-    t: f32x8<S>,
-    edges: f32x8<S>,
-    of_depth: (f32x8<S>, f32x8<S>),
+pub(super) struct Seen<V> {
+    u: [V; 3],
+    v: [V; 3],
+    det: [V; 3],
+    t: V,
+    edges: V,
+    of_depth: (V, V),
 }
 
 /// The margin of a test of all directions at once, against that of one: it loses 14 roundings of |e||r||d| where that loses 12.
 const OF_ALL: f32 = 1.25;
 
-impl<S: Simd> Seen<S> {
+impl<S: Simd> Seen<f32x8<S>> {
     #[inline(always)]
     pub(super) fn new(simd: S, triangles: &Triangles<S>, view: &View, margins: &Margins) -> Self {
         let &Triangles { v0, e1, e2, size } = triangles;
@@ -72,37 +72,66 @@ impl<S: Simd> Seen<S> {
         !(missed.to_bitmask() as u32) & 0xff
     }
 
-    /// The triangle of a lane against sixteen rays.
+    /// One triangle, in every lane.
     #[inline(always)]
-    pub(super) fn triangle(&self, simd: S, lane: usize, rays: &Sixteen) -> Sighting<f32x16<S>, mask32x16<S>> {
-        let d =
-            [rays.direction[0].simd_into(simd), rays.direction[1].simd_into(simd), rays.direction[2].simd_into(simd)];
-        let [u, v, det] = [&self.u, &self.v, &self.det];
-        let [u, v, det] = [dot(of(simd, u, lane), d), dot(of(simd, v, lane), d), dot(of(simd, det, lane), d)];
-        let everywhere = |x: &f32x8<S>| f32x16::splat(simd, x[lane & 7]);
-        Sides::new([u, v], det, everywhere(&self.edges)).depths(
-            simd,
-            [everywhere(&self.t), det],
-            (everywhere(&self.of_depth.0), everywhere(&self.of_depth.1)),
-            [rays.t_min.simd_into(simd), rays.t_max.simd_into(simd)],
+    pub(super) fn one(&self, simd: S, lane: usize) -> Seen<f32x16<S>> {
+        self.each(
+            #[inline(always)]
+            |x| f32x16::splat(simd, x[lane & 7]),
         )
     }
 
-    /// All triangles against one of sixteen rays; `None` if all are certain misses.
+    /// All triangles, in the first eight lanes and in the last.
     #[inline(always)]
-    pub(super) fn ray(&self, simd: S, rays: &Sixteen, at: usize) -> Option<OfEight<S>> {
-        let d = everywhere(simd, &rays.direction, at);
+    pub(super) fn twice(&self) -> Seen<f32x16<S>> {
+        self.each(
+            #[inline(always)]
+            |x| x.combine(x),
+        )
+    }
+
+    #[inline(always)]
+    fn each(&self, of: impl Fn(f32x8<S>) -> f32x16<S>) -> Seen<f32x16<S>> {
+        let Self { u, v, det, t, edges, of_depth } = *self;
+        Seen {
+            u: [of(u[0]), of(u[1]), of(u[2])],
+            v: [of(v[0]), of(v[1]), of(v[2])],
+            det: [of(det[0]), of(det[1]), of(det[2])],
+            t: of(t),
+            edges: of(edges),
+            of_depth: (of(of_depth.0), of(of_depth.1)),
+        }
+    }
+}
+
+/// What is made of sixteen pairs of a ray and a triangle.
+pub(super) type SixteenSighted<S> = Sighting<f32x16<S>, mask32x16<S>>;
+
+impl<S: Simd> Seen<f32x16<S>> {
+    /// One triangle against sixteen rays.
+    #[inline(always)]
+    pub(super) fn by(&self, simd: S, Sixteen { direction: d, t_min, t_max, .. }: &Sixteen) -> SixteenSighted<S> {
+        let d = [d[0].simd_into(simd), d[1].simd_into(simd), d[2].simd_into(simd)];
+        self.along(simd, d, [(*t_min).simd_into(simd), (*t_max).simd_into(simd)])
+    }
+
+    /// Eight triangles, here twice, against two rays of a bundle.
+    #[inline(always)]
+    pub(super) fn by_two(&self, simd: S, rays: &[Sixteen; SIXTEENS], two: [usize; 2]) -> SixteenSighted<S> {
+        let [a, b] = [&rays[two[0] / 16 % SIXTEENS], &rays[two[1] / 16 % SIXTEENS]];
+        let d = [
+            halves(simd, [&a.direction[0], &b.direction[0]], two),
+            halves(simd, [&a.direction[1], &b.direction[1]], two),
+            halves(simd, [&a.direction[2], &b.direction[2]], two),
+        ];
+        self.along(simd, d, [halves(simd, [&a.t_min, &b.t_min], two), halves(simd, [&a.t_max, &b.t_max], two)])
+    }
+
+    #[inline(always)]
+    fn along(&self, simd: S, d: [f32x16<S>; 3], stretch: [f32x16<S>; 2]) -> SixteenSighted<S> {
         let det = dot(self.det, d);
         let sides = Sides::new([dot(self.u, d), dot(self.v, d)], det, self.edges);
-        if sides.maybe == 0 {
-            return None;
-        }
-        let stretch = [splat(simd, rays.t_min[at & 15]), splat(simd, rays.t_max[at & 15])];
-        let depths = sides.depths(simd, [self.t, det], self.of_depth, stretch);
-        if depths.maybe == 0 {
-            return None;
-        }
-        Some(depths.verdict(simd))
+        sides.depths(simd, [self.t, det], self.of_depth, stretch)
     }
 }
 
@@ -116,11 +145,10 @@ fn ends<S: Simd>(a: Vec8<S>, middle: Vec8<S>, half: Vec8<S>) -> [f32x8<S>; 2] {
     [at - reach, at + reach]
 }
 
-/// One lane of a vector's components, in every lane.
+/// A lane of one row in the first eight lanes, a lane of another in the last.
 #[inline(always)]
-fn of<S: Simd>(simd: S, v: &Vec8<S>, lane: usize) -> [f32x16<S>; 3] {
-    let everywhere = |x: f32| f32x16::splat(simd, x);
-    [everywhere(v[0][lane & 7]), everywhere(v[1][lane & 7]), everywhere(v[2][lane & 7])]
+fn halves<S: Simd>(simd: S, [a, b]: [&[f32; 16]; 2], lanes: [usize; 2]) -> f32x16<S> {
+    splat(simd, a[lanes[0] & 15]).combine(splat(simd, b[lanes[1] & 15]))
 }
 
 /// One lane of each row, in every lane.
