@@ -47,6 +47,20 @@ fn frame(criterion: &mut Criterion) {
         let within = Interval::new(0.0, 1.0);
         b.iter(|| shadows.iter().filter(|ray| scene.occludes(black_box(ray), within)).count());
     });
+    let together: Vec<(Ray, Interval)> = rays.iter().map(|&ray| (ray, Interval::FORWARD)).collect();
+    let mut nearest = vec![None; together.len()];
+    group.throughput(Throughput::Elements(rays.len() as u64));
+    group.bench_function("nearest, all in one call", |b| {
+        b.iter(|| scene.intersect_each(black_box(&together), &mut nearest));
+    });
+    assert_eq!(nearest.iter().flatten().count(), seen.len());
+    let together: Vec<(Ray, Interval)> = shadows.iter().map(|&ray| (ray, Interval::new(0.0, 1.0))).collect();
+    let mut shadowed = vec![false; together.len()];
+    group.throughput(Throughput::Elements(shadows.len() as u64));
+    group.bench_function("shadows, all in one call", |b| {
+        b.iter(|| scene.occludes_each(black_box(&together), &mut shadowed));
+    });
+    assert_eq!(shadowed.iter().filter(|&&dark| dark).count(), dark);
     let whitted = stage.whitted();
     let cast = whitted.render(&camera, 1).rays;
     assert!(cast.total() > 2 * cast.camera && cast.mirror > cast.camera / 20, "{cast:?}");

@@ -216,6 +216,17 @@ impl<S: Shape> Affine<S> {
         (0.0, if widest.is_finite() { widest } else { f64::INFINITY })
     }
 
+    /// What `hit`, the first of the rounded image in `zone`, is of the ray itself, or what comes after it.
+    #[inline(always)]
+    fn answer(&self, image: &Image, hit: Hit, zone: Interval, within: Interval) -> Option<Hit> {
+        let (shift, error) = self.shift(image, &hit);
+        let Hit { lambda, error, .. } = corrected(&hit, shift, error);
+        if lambda - error > within.min && lambda + error < within.max {
+            return Some(Hit { lambda, error, ..hit });
+        }
+        self.next_to_limit(image, hit, zone, within)
+    }
+
     /// Next to a limit: the first hit of which the corrected λ lies inside `within`, from the first one in `zone` on. Where
     /// that is not known, the rounded image decides.
     #[cold]
@@ -319,12 +330,21 @@ impl<S: Shape> Shape for Affine<S> {
             None => self.shape.intersect(&image.ray, zone),
             Some((innermost, _)) => innermost.intersect(&image.ray, zone),
         }?;
-        let (shift, error) = self.shift(&image, &hit);
-        let Hit { lambda, error, .. } = corrected(&hit, shift, error);
-        if lambda - error > within.min && lambda + error < within.max {
-            return Some(Hit { lambda, error, ..hit });
+        self.answer(&image, hit, zone, within)
+    }
+
+    fn intersect_each(&self, rays: &[(Ray, Interval)], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "there must be one hit for each ray");
+        let images: Vec<Image> = rays.iter().map(|(ray, _)| self.image(ray)).collect();
+        let zoned = images.iter().zip(rays).map(|(image, &(_, within))| {
+            let zone = if within.is_empty() { within } else { widened(image, within) };
+            (image.ray, zone)
+        });
+        let zoned: Vec<(Ray, Interval)> = zoned.collect();
+        self.innermost().intersect_each(&zoned, hits);
+        for (i, hit) in hits.iter_mut().enumerate() {
+            *hit = hit.and_then(|hit| self.answer(&images[i], hit, zoned[i].1, rays[i].1));
         }
-        self.next_to_limit(&image, hit, zone, within)
     }
 
     fn normal(&self, world_ray: &Ray, hit: &Hit) -> DVec3 {

@@ -40,6 +40,30 @@ pub trait Shape: Debug + Send + Sync {
         self.intersect(ray, within).is_some()
     }
 
+    /// The nearest hits of many rays: `hits[i]` becomes what [`intersect`](Self::intersect) answers to `rays[i]`. The default asks
+    /// one by one; a mesh walks rays that go the same way together.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    fn intersect_each(&self, rays: &[(Ray, Interval)], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "there must be one hit for each ray");
+        for ((ray, within), hit) in rays.iter().zip(hits) {
+            *hit = self.intersect(ray, *within);
+        }
+    }
+
+    /// Whether many rays hit anything: [`occludes`](Self::occludes) for each, as [`intersect_each`](Self::intersect_each) for
+    /// [`intersect`](Self::intersect).
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    fn occludes_each(&self, rays: &[(Ray, Interval)], hits: &mut [bool]) {
+        assert_eq!(rays.len(), hits.len(), "there must be one answer for each ray");
+        for ((ray, within), hit) in rays.iter().zip(hits) {
+            *hit = self.occludes(ray, *within);
+        }
+    }
+
     /// The normal that shading uses: a unit vector, interpolated on smooth meshes, else the geometric
     /// [`normal`](Self::normal).
     fn shading_normal(&self, ray: &Ray, hit: &Hit) -> DVec3 {
@@ -141,6 +165,12 @@ macro_rules! forward_shape {
             }
             fn occludes(&self, ray: &Ray, within: Interval) -> bool {
                 (**self).occludes(ray, within)
+            }
+            fn intersect_each(&self, rays: &[(Ray, Interval)], hits: &mut [Option<Hit>]) {
+                (**self).intersect_each(rays, hits);
+            }
+            fn occludes_each(&self, rays: &[(Ray, Interval)], hits: &mut [bool]) {
+                (**self).occludes_each(rays, hits);
             }
             fn shading_normal(&self, ray: &Ray, hit: &Hit) -> DVec3 {
                 (**self).shading_normal(ray, hit)

@@ -1,7 +1,20 @@
 //! The scene's own promises, on a user's shape: nearest, ties, odd boxes, emptiness.
 
-use truehit::glam::{DVec2, DVec3};
-use truehit::{Aabb, Hit, Interval, Plane, Ray, Scene, Shape};
+#[path = "support/rng.rs"]
+mod rng;
+
+mod meshes;
+
+use rng::Rng;
+use std::sync::Arc;
+use truehit::glam::{DAffine3, DQuat, DVec2, DVec3};
+use truehit::{Aabb, Affine, Camera, Hit, Interval, Mesh, Plane, Ray, Scene, Shape, Sphere};
+
+/// A sphere of triangles, quartered so often.
+fn globe(times: u32) -> Mesh {
+    let (positions, triangles) = meshes::icosphere(times);
+    Mesh::new(positions, triangles).unwrap()
+}
 
 /// The plane z = `z`, as a user might write it: it claims `error`, and knows its λ to `low` more.
 #[derive(Debug)]
@@ -132,4 +145,71 @@ fn rays_and_intervals_that_hold_nothing_miss() {
 fn scenes_cross_threads() {
     fn assert_send_sync<T: Send + Sync + 'static>() {}
     assert_send_sync::<Scene<u32>>();
+}
+
+/// A camera's rays in tiles and in rows, rays without order, rays to a light: what many rays are answered together is what each is
+/// answered alone.
+#[test]
+fn slices_are_answered_like_their_rays() {
+    let mut r = Rng::new(5);
+    let mut builder = Scene::builder();
+    let shared = Arc::new(globe(3));
+    builder.push(Plane::new([0.0, 0.0, -2.0], [0.1, 0.0, 1.0]).unwrap(), ());
+    builder.push(globe(4), ());
+    builder.push(Sphere::new([1.5, 0.5, 0.2], 0.7).unwrap(), ());
+    builder.push(wall(-1.9), ());
+    for i in 0..40 {
+        let place = DAffine3::from_scale_rotation_translation(
+            DVec3::splat(0.3) + 0.2 * r.in_cube(1.0).abs(),
+            DQuat::from_axis_angle(r.unit(), 2.0),
+            3.0 * r.in_cube(1.0),
+        );
+        if i % 4 == 0 {
+            builder.push(Affine::new(Sphere::UNIT, place).unwrap(), ());
+        } else {
+            builder.push(Affine::new(shared.clone(), place).unwrap(), ());
+        }
+    }
+    // Twice the same: the first is answered.
+    builder.push(globe(4), ());
+    let scene = builder.build();
+
+    let camera = Camera::look_at([0.0, -9.0, 2.0], [0.0; 3], [0.0, 0.0, 1.0], 0.7, [64, 64]).unwrap();
+    let pixel = |i: u32, j: u32| (camera.pixel(i, j), Interval::FORWARD);
+    let rows: Vec<_> = (0..64 * 64).map(|at| pixel(at % 64, at / 64)).collect();
+    let tiles: Vec<_> = (0..64 * 64).map(|at| pixel(at / 16 % 16 * 4 + at % 4, at / 256 * 4 + at / 4 % 4)).collect();
+    let anyhow: Vec<_> = (0..2000)
+        .map(|_| (Ray::new(6.0 * r.in_cube(1.0), r.unit()), Interval::new(0.0, r.uniform(1.0, 20.0))))
+        .collect();
+    let lamp = DVec3::new(4.0, -5.0, 6.0);
+    let to_lamp = rows.iter().filter_map(|(ray, within)| {
+        let hit = scene.intersect(ray, *within)?;
+        Some((scene.surface(ray, &hit).spawn_to(lamp), Interval::new(0.0, 1.0)))
+    });
+    let to_lamp: Vec<_> = to_lamp.collect();
+    let mut odd = rows[1000..1100].to_vec();
+    odd[40].0.direction = DVec3::NAN;
+    odd[41].1 = Interval::new(2.0, 1.0);
+    odd[77].0.origin = DVec3::splat(1e300);
+
+    for (name, rays) in
+        [("rows", &rows), ("tiles", &tiles), ("anyhow", &anyhow), ("to the lamp", &to_lamp), ("odd", &odd)]
+    {
+        let alone: Vec<_> = rays.iter().map(|(ray, within)| scene.intersect(ray, *within)).collect();
+        let hits = alone.iter().flatten().count();
+        println!("{name}: {hits} of {} rays hit", rays.len());
+        assert!(3 * hits > rays.len() || name == "to the lamp", "{name}");
+        for length in [rays.len(), 100, 32, 9] {
+            for (rays, alone) in rays.chunks(length).zip(alone.chunks(length)) {
+                let (mut together, mut dark) = (vec![None; rays.len()], vec![false; rays.len()]);
+                scene.intersect_each(rays, &mut together);
+                scene.occludes_each(rays, &mut dark);
+                for (i, (ray, within)) in rays.iter().enumerate() {
+                    assert_eq!(together[i], alone[i], "{name}, {length} at a time: {ray:?} {within:?}");
+                    assert_eq!(dark[i], alone[i].is_some(), "{name}, {length} at a time: {ray:?} {within:?}");
+                }
+            }
+        }
+    }
+    scene.intersect_each(&[], &mut []);
 }

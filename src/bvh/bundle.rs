@@ -4,7 +4,7 @@
 //! box that is next in turn with all rays, sixteen a vector: docs/numerics.md §10.
 
 use super::frame::Frame;
-use super::slab::{E, FARTHEST_T, LENGTHS, NEAR, PLAIN_ERROR, SLAB, STEEPEST, TINY};
+use super::slab::{E, FARTHEST_T, LENGTHS, Limits, NEAR, PLAIN_ERROR, SLAB, STEEPEST, TINY};
 use super::waiting::{Waiting, in_order, lane_of, t_of};
 use super::wide::{LEAF, Wide, WideNode, near_rows};
 use crate::kernel::rows::{columns, row};
@@ -375,6 +375,15 @@ impl Bundle {
             return a.meet_mixed(simd, node, lane) | b.meet_mixed(simd, node, lane) << 16;
         }
         a.meet(simd, node, lane, near) | b.meet(simd, node, lane, near) << 16
+    }
+
+    /// Nothing of the ray matters from `lambda` on, if the bundle is seen from its origin.
+    #[inline(always)]
+    pub(crate) fn limit(&mut self, ray: usize, lambda: f64) {
+        let (t, t_max) = (Limits::PLAIN.upper(lambda), &mut self.rays[ray / 16 % SIXTEENS].t_max[ray % 16]);
+        if t < *t_max {
+            *t_max = t;
+        }
     }
 
     /// Keeps the largest t that matters, after one of the rays' has changed.

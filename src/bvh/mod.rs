@@ -16,6 +16,7 @@ mod node;
 mod quality;
 mod reinsert;
 mod slab;
+mod slices;
 mod split;
 mod tasks;
 mod traverse;
@@ -29,6 +30,7 @@ pub(crate) use bundle::{Bundle, RAYS, SIXTEENS, Sixteen, Start, Together, togeth
 pub(crate) use collapse::build;
 pub(crate) use frame::{Frame, FrameBox};
 pub(crate) use slab::{E, Limits, LocalRay, Sure};
+pub(crate) use slices::{Stretch, each, end_together, go_together};
 pub(crate) use tasks::map;
 pub(crate) use traverse::{Any, Closest, Lanes, any, closest};
 pub(crate) use watch::Watch;
@@ -182,6 +184,36 @@ impl Bvh {
         any(simd, &self.tree, &Lanes::<S, FORWARD>::new(simd, local), local.t_max, &mut First { bvh: self, hits })
     }
 
+    /// Takes the rays of a bundle, the first `many` of which count, through the tree together: `visit(object, rays, bundle)` for every object whose box some of them
+    /// meet before their t_max, nearest boxes first, with those rays as bits. `false`, and nothing visited, if they are no bundle.
+    pub(crate) fn together(
+        &self,
+        rays: &[Stretch; RAYS],
+        many: usize,
+        from: Start,
+        bundle: &mut Bundle,
+        mut visit: impl FnMut(u32, u32, &mut Bundle),
+    ) -> bool {
+        dispatch!(self.level.of_many(), simd => self.together_with(simd, rays, many, from, bundle, &mut visit))
+    }
+
+    #[inline(always)]
+    fn together_with<S: Simd>(
+        &self,
+        simd: S,
+        rays: &[Stretch; RAYS],
+        many: usize,
+        from: Start,
+        bundle: &mut Bundle,
+        visit: &mut impl FnMut(u32, u32, &mut Bundle),
+    ) -> bool {
+        let taken = bundle.take(simd, &self.tree.frame, rays, many, from);
+        if taken {
+            together(simd, &self.tree, &mut Group { bvh: self, bundle, visit });
+        }
+        taken
+    }
+
     /// Uses the instructions of `level` from now on, if this CPU has them: for tests and benchmarks. All levels give
     /// the same answers.
     pub fn set_level(&mut self, level: Level) {
@@ -224,5 +256,27 @@ impl<S: Simd, F: FnMut(u32) -> bool> Any<S> for First<'_, F> {
     #[inline(always)]
     fn leaf(&mut self, _: S, leaf: u32) -> bool {
         (self.hits)(self.bvh.leaf(leaf))
+    }
+}
+
+struct Group<'a, F> {
+    bvh: &'a Bvh,
+    bundle: &'a mut Bundle,
+    visit: F,
+}
+
+impl<S: Simd, F: FnMut(u32, u32, &mut Bundle)> Together<S> for Group<'_, F> {
+    #[inline(always)]
+    fn bundle(&self) -> &Bundle {
+        self.bundle
+    }
+
+    #[inline(always)]
+    fn leaf(&mut self, simd: S, leaf: u32, rays: u32) {
+        (self.visit)(self.bvh.leaf(leaf), rays, self.bundle);
+        self.bundle.shorten(simd);
+        if self.bundle.asking == 0 {
+            self.bundle.t_max = f32::NEG_INFINITY;
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Rgb;
 use crate::kernel::float::unit;
-use crate::{Interval, Ray, Scene, Surface};
+use crate::{Interval, Ray, Surface};
 use glam::DVec3;
 
 /// A light without extent. It does not fade with distance: the lecture's I_d and I_s are constants.
@@ -59,19 +59,13 @@ impl Light {
         }
     }
 
-    /// The shadow ray from `surface`, and the stretch of it on which an object casts a shadow.
+    /// The shadow ray from `surface`, and the stretch of it on which an object casts a shadow: see
+    /// [`Scene::occludes`](crate::Scene::occludes).
     #[must_use]
     pub fn shadow_ray(&self, surface: &Surface<'_>) -> (Ray, Interval) {
         match *self {
             Self::Point { position, .. } => (surface.spawn_to(position), Interval::new(0.0, 1.0)),
             Self::Directional { towards, .. } => (surface.spawn(towards), Interval::FORWARD),
         }
-    }
-
-    /// Whether an object of `scene` stands between `surface` and this light.
-    #[must_use]
-    pub fn is_shadowed<M>(&self, scene: &Scene<M>, surface: &Surface<'_>) -> bool {
-        let (ray, within) = self.shadow_ray(surface);
-        scene.occludes(&ray, within)
     }
 }

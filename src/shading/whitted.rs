@@ -5,7 +5,7 @@ use super::material::{Material, Mirror, Sides};
 use super::{Light, phong};
 use crate::kernel::float::unit;
 use crate::raster::each_row;
-use crate::{Camera, Interval, Raster, Ray, Scene, Surface};
+use crate::{Camera, Interval, Raster, Ray, Scene, SceneHit, Surface};
 use glam::DVec3;
 use std::ops::AddAssign;
 
@@ -153,7 +153,7 @@ impl<'a> Whitted<'a> {
     pub fn render_with(&self, camera: &Camera, strata: u32, row_done: impl Fn(RayCount) + Sync) -> Rendering {
         let rows = each_row(camera.height(), |j| {
             let mut rays = RayCount::default();
-            let row: Vec<Rgb> = (0..camera.width()).map(|i| self.pixel(camera, i, j, strata, &mut rays)).collect();
+            let row = self.row(camera, j, strata, &mut rays);
             row_done(rays);
             (row, rays)
         });
@@ -165,80 +165,162 @@ impl<'a> Whitted<'a> {
         Rendering { picture, rays }
     }
 
-    /// The mean over the pixel's samples.
-    fn pixel(&self, camera: &Camera, i: u32, j: u32, strata: u32, rays: &mut RayCount) -> Rgb {
-        let samples = strata.clamp(1, 0xFFFF).pow(2);
-        let sum: Rgb = (0..samples).map(|index| self.radiance(&camera.sample(i, j, index, strata), rays)).sum();
-        sum / f64::from(samples)
+    /// The pixels of row j, each the mean over its samples.
+    fn row(&self, camera: &Camera, j: u32, strata: u32, rays: &mut RayCount) -> Vec<Rgb> {
+        let samples = u64::from(strata.clamp(1, 0xFFFF).pow(2));
+        let mut row = vec![Rgb::ZERO; camera.width() as usize];
+        let end = u64::from(camera.width()) * samples;
+        let mut from = 0;
+        while from < end {
+            let wave = from..(from + WAVE).min(end);
+            let ray = |at: u64| camera.sample((at / samples) as u32, j, (at % samples) as u32, strata);
+            for (at, color) in wave.clone().zip(self.radiances(wave.clone().map(ray), rays)) {
+                row[(at / samples) as usize] += color;
+            }
+            from = wave.end;
+        }
+        row.iter().map(|&sum| sum / samples as f64).collect()
     }
 
     /// E seen along `ray`, in linear RGB.
-    ///
-    /// The recursion E = local + r_g·E' has one branch, so it is a loop: `share` is the product of the r_g so far.
     #[must_use]
     pub fn radiance(&self, ray: &Ray, rays: &mut RayCount) -> Rgb {
-        rays.camera += 1;
-        let (mut ray, mut within) = (*ray, Interval::FORWARD);
-        let (mut sum, mut share) = (Rgb::ZERO, Rgb::ONE);
-        // The mirror that `ray` comes from. Mirrored rays have unit directions, so their λ is a distance.
-        let mut mirror: Option<Mirror> = None;
-        for bounce in 0.. {
-            let found = self.scene.intersect(&ray, within);
-            if let Some(mirror) = mirror {
-                share *= mirror.at(found.map_or(f64::INFINITY, |f| f.hit.lambda));
-                if share == Rgb::ZERO {
-                    return sum;
-                }
-            }
-            let Some(found) = found else {
-                return sum + share * self.background.color(ray.direction);
-            };
-            let material = self.scene.tag(found.object);
-            let surface = self.scene.surface(&ray, &found);
-            let view = View::new(&surface, ray.direction);
-            sum += share * self.local(material, &surface, &view, rays);
-
-            let next = share * material.mirror.reflectance;
-            let reflects = view.front || material.sides == Sides::Both;
-            let counts = next.max_element() > self.cutoff.max(0.0);
-            if bounce == self.depth || !reflects || !counts {
-                return sum;
-            }
-            rays.mirror += 1;
-            ray = surface.spawn(view.mirrored());
-            within = Interval::new(0.0, material.mirror.range);
-            mirror = Some(material.mirror);
-        }
-        sum
+        self.radiances(std::iter::once(*ray), rays)[0]
     }
 
-    /// r_d I_d max(0, s·n) + r_a I_a + r_s I_s max(0, r·c)^α over all lights that are not in shadow.
-    fn local(&self, material: &Material, surface: &Surface<'_>, view: &View, rays: &mut RayCount) -> Rgb {
+    /// E seen along each of `camera_rays`, in linear RGB. All of them are followed bounce by bounce together, since rays of
+    /// neighbouring pixels, and their shadow rays to one light, are found much faster so; each answer is the ray's own.
+    ///
+    /// The recursion E = local + r_g·E' has one branch, so it is a loop.
+    #[must_use]
+    pub fn radiances(&self, camera_rays: impl IntoIterator<Item = Ray>, rays: &mut RayCount) -> Vec<Rgb> {
+        let mut paths: Vec<Path> = camera_rays.into_iter().map(Path::from_camera).collect();
+        rays.camera += paths.len() as u64;
+        let mut open: Vec<usize> = (0..paths.len()).collect();
+        for bounce in 0.. {
+            let asked: Vec<(Ray, Interval)> = open.iter().map(|&path| (paths[path].ray, paths[path].within)).collect();
+            let mut found = vec![None; asked.len()];
+            self.scene.intersect_each(&asked, &mut found);
+            let mut seen: Vec<Seen> = Vec::with_capacity(open.len());
+            for (&path, found) in open.iter().zip(&found) {
+                seen.extend(self.see(path, &mut paths[path], found.as_ref()));
+            }
+            self.light_up(&mut seen, rays);
+            open.clear();
+            for Seen { path: index, material, surface, view, local, .. } in &seen {
+                let path = &mut paths[*index];
+                path.sum += path.share * local;
+                let next = path.share * material.mirror.reflectance;
+                let reflects = view.front || material.sides == Sides::Both;
+                let counts = next.max_element() > self.cutoff.max(0.0);
+                if bounce == self.depth || !reflects || !counts {
+                    continue;
+                }
+                rays.mirror += 1;
+                path.ray = surface.spawn(view.mirrored());
+                path.within = Interval::new(0.0, material.mirror.range);
+                path.mirror = Some(material.mirror);
+                open.push(*index);
+            }
+            if open.is_empty() {
+                break;
+            }
+        }
+        paths.iter().map(|path| path.sum).collect()
+    }
+
+    /// What the path's ray meets, without the lights yet; `None` if nothing comes of it any more.
+    fn see(&self, index: usize, path: &mut Path, found: Option<&SceneHit>) -> Option<Seen<'a>> {
+        if let Some(mirror) = path.mirror {
+            path.share *= mirror.at(found.map_or(f64::INFINITY, |f| f.hit.lambda));
+            if path.share == Rgb::ZERO {
+                return None;
+            }
+        }
+        let Some(found) = found else {
+            path.sum += path.share * self.background.color(path.ray.direction);
+            return None;
+        };
+        let material = self.scene.tag(found.object);
+        let surface = self.scene.surface(&path.ray, found);
+        let view = View::new(&surface, path.ray.direction);
         let (ambient, diffuse) = material.modulated(|| surface.texture_coordinates());
-        let mut sum = ambient * self.ambient;
+        Some(Seen { path: index, material, surface, view, diffuse, local: ambient * self.ambient })
+    }
+
+    /// Adds r_d I_d max(0, s·n) + r_s I_s max(0, r·c)^α of each light that is not in shadow.
+    fn light_up(&self, seen: &mut [Seen], rays: &mut RayCount) {
+        for light in &self.lights {
+            let mut lit: Vec<(usize, Rgb)> = Vec::with_capacity(seen.len());
+            let mut asked: Vec<(Ray, Interval)> = Vec::with_capacity(seen.len());
+            for (index, seen) in seen.iter().enumerate() {
+                let color = seen.under(light);
+                if color != Rgb::ZERO {
+                    lit.push((index, color));
+                    asked.push(light.shadow_ray(&seen.surface));
+                }
+            }
+            rays.shadow += asked.len() as u64;
+            let mut dark = vec![false; asked.len()];
+            self.scene.occludes_each(&asked, &mut dark);
+            for (&(index, color), dark) in lit.iter().zip(dark) {
+                if !dark {
+                    seen[index].local += color;
+                }
+            }
+        }
+    }
+}
+
+/// How many rays are followed together: enough to fill many bundles, few enough to stay in the cache.
+const WAVE: u64 = 512;
+
+/// A camera ray and what has been seen along it so far.
+struct Path {
+    ray: Ray,
+    within: Interval,
+    sum: Rgb,
+    /// The product of the r_g so far.
+    share: Rgb,
+    /// The mirror that `ray` comes from. Mirrored rays have unit directions, so their λ is a distance.
+    mirror: Option<Mirror>,
+}
+
+impl Path {
+    fn from_camera(ray: Ray) -> Self {
+        Self { ray, within: Interval::FORWARD, sum: Rgb::ZERO, share: Rgb::ONE, mirror: None }
+    }
+}
+
+/// Where a path's ray has met something.
+struct Seen<'a> {
+    path: usize,
+    material: &'a Material,
+    surface: Surface<'a>,
+    view: View,
+    /// r_d under the texture.
+    diffuse: Rgb,
+    /// r_a I_a, and what the lights add.
+    local: Rgb,
+}
+
+impl Seen<'_> {
+    /// What `light` adds here if nothing is in the way.
+    fn under(&self, light: &Light) -> Rgb {
+        let Self { material, surface, view, diffuse, .. } = self;
         if !view.front && material.sides == Sides::Front {
-            return sum;
+            return Rgb::ZERO;
         }
         let (n, facet) = (view.normal, view.facet);
-        for light in &self.lights {
-            let incident = light.incident(surface.point());
-            let s = incident.direction;
-            // The light must be above the surface itself, not only above the interpolated normal's idea of it.
-            if !(s.dot(n) > 0.0 && s.dot(facet) > 0.0) {
-                continue;
-            }
-            let lit = diffuse * phong::diffuse(s, n)
-                + material.specular * phong::specular(s, n, view.to_camera, material.shininess);
-            let lit = phong::terminator(s, n, facet) * lit * incident.intensity;
-            if lit == Rgb::ZERO {
-                continue;
-            }
-            rays.shadow += 1;
-            if !light.is_shadowed(self.scene, surface) {
-                sum += lit;
-            }
+        let incident = light.incident(surface.point());
+        let s = incident.direction;
+        // The light must be above the surface itself, not only above the interpolated normal's idea of it.
+        if !(s.dot(n) > 0.0 && s.dot(facet) > 0.0) {
+            return Rgb::ZERO;
         }
-        sum
+        let lit = diffuse * phong::diffuse(s, n)
+            + material.specular * phong::specular(s, n, view.to_camera, material.shininess);
+        phong::terminator(s, n, facet) * lit * incident.intensity
     }
 }
 

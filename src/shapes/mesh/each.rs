@@ -6,22 +6,18 @@ use super::leaf::{Margins, Spot, Verdict, filter};
 use super::query::{self, exactly, nearer, occluded};
 use super::seen::{OfSixteen, Seen, View, everywhere};
 use super::settle::{Remembered, settle};
-use crate::bvh::{self, Bundle, Limits, RAYS, SIXTEENS, Start};
-use crate::{Hit, Interval, Ray};
+use crate::Hit;
+use crate::bvh::{self, Bundle, RAYS, SIXTEENS, Start, Stretch};
 use fearless_simd::{Simd, dispatch, f32x8, f32x16, prelude::*, u32x16};
-use glam::DVec3;
-
-/// A ray and the stretch of it that counts.
-pub(super) type Stretch = (Ray, Interval);
 
 /// `hits[i]` becomes the nearest hit of `rays[i]`.
 pub(super) fn closest(mesh: &Mesh, rays: &[Stretch], hits: &mut [Option<Hit>]) {
     let mut bundle = None;
-    each(
+    bvh::each(
         rays,
         hits,
         |rays, many, hits| dispatch!(mesh.level.of_many(), simd => closest_with(simd, mesh, rays, many, &mut bundle, hits)),
-        go_together,
+        bvh::go_together,
         |(ray, within), hit| query::find_closest(mesh, ray, *within, hit),
     );
 }
@@ -29,86 +25,13 @@ pub(super) fn closest(mesh: &Mesh, rays: &[Stretch], hits: &mut [Option<Hit>]) {
 /// `hits[i]` becomes whether `rays[i]` hits anything.
 pub(super) fn any(mesh: &Mesh, rays: &[Stretch], hits: &mut [bool]) {
     let mut bundle = None;
-    each(
+    bvh::each(
         rays,
         hits,
         |rays, many, hits| dispatch!(mesh.level.of_many(), simd => any_with(simd, mesh, rays, many, &mut bundle, hits)),
-        |rays| go_together(rays) || end_together(rays),
+        |rays| bvh::go_together(rays) || bvh::end_together(rays),
         |(ray, within), hit| *hit = query::any(mesh, ray, *within),
     );
-}
-
-/// A bundle at a time by `together`, which is told how many rays count and may refuse, the others one by one. After a refusal bundles are tried ever more
-/// seldom, so that rays without any order cost no more than alone. What is left of the slice is tried if it `may` be a bundle.
-fn each<T: Copy + Default>(
-    rays: &[Stretch],
-    hits: &mut [T],
-    mut together: impl FnMut(&[Stretch; RAYS], usize, &mut [T; RAYS]) -> bool,
-    may: impl Fn(&[Stretch]) -> bool,
-    alone: impl Fn(&Stretch, &mut T),
-) {
-    const MOST_PATIENT: u32 = 64;
-    let (mut wait, mut patience) = (0, 0);
-    let (bundles, rest) = rays.as_chunks::<RAYS>();
-    let (of_bundles, of_rest) = hits.as_chunks_mut::<RAYS>();
-    for (rays, hits) in bundles.iter().zip(of_bundles) {
-        if wait > 0 {
-            wait -= 1;
-        } else if together(rays, RAYS, hits) {
-            patience = 0;
-            continue;
-        } else {
-            wait = patience;
-            patience = (2 * patience).clamp(1, MOST_PATIENT);
-        }
-        for (hit, ray) in hits.iter_mut().zip(rays) {
-            alone(ray, hit);
-        }
-    }
-    // The first two before all others: farther on memory would have to be waited for.
-    if rest.len() >= FEWEST && wait == 0 && is_near(rest[0].0.direction, rest[1].0.direction) && may(rest) {
-        // The last of them stands for those that are not there.
-        let (mut rays, mut answers) = ([rest[rest.len() - 1]; RAYS], [T::default(); RAYS]);
-        rays[..rest.len()].copy_from_slice(rest);
-        if together(&rays, rest.len(), &mut answers) {
-            of_rest.copy_from_slice(&answers[..rest.len()]);
-            return;
-        }
-    }
-    for (hit, ray) in of_rest.iter_mut().zip(rest) {
-        alone(ray, hit);
-    }
-}
-
-/// Fewer rays than this are no bundle; [`end_together`] looks at six.
-const FEWEST: usize = 8;
-
-/// Rays turned by more than this against each other, and ends farther apart, in lengths of the ray, are not tried as a bundle: of
-/// the way that answers are found, not of the answers.
-const TURNED: f64 = 0.5;
-const APART: f64 = 1e-5;
-
-/// A first look that costs next to nothing: whether a few directions are alike. [`Bundle::take`] looks at all.
-fn go_together(rays: &[Stretch]) -> bool {
-    let first = rays[0].0.direction;
-    (1..4).all(|i| is_near(first, rays[i * (rays.len() - 1) / 3].0.direction))
-}
-
-/// Alike, whether the rays may end at one place, and most come there the way their neighbours do: they start at surfaces, here and
-/// there at another than the one before.
-fn end_together(rays: &[Stretch]) -> bool {
-    let end = |(ray, within): &Stretch| ray.origin + within.max * ray.direction;
-    let (first, last) = (end(&rays[0]), end(&rays[rays.len() - 1]));
-    let way = rays[0].1.max.abs() * rays[0].0.direction.abs().max_element();
-    let neighbours = |i: &usize| {
-        let i = i * rays.len() / 5;
-        is_near(rays[i].0.direction, rays[i + 1].0.direction)
-    };
-    (first - last).abs().max_element() <= way * APART && (1..5).filter(neighbours).count() >= 3
-}
-
-fn is_near(a: DVec3, b: DVec3) -> bool {
-    (b - a).abs().max_element() <= TURNED * a.abs().max_element()
 }
 
 /// A bundle's walk, with what all its rays have in common.
@@ -262,7 +185,7 @@ fn closest_with<S: Simd>(
     bundle: &mut Option<Bundle>,
     hits: &mut [Option<Hit>; RAYS],
 ) -> bool {
-    if !go_together(rays) {
+    if !bvh::go_together(rays) {
         return false;
     }
     let bundle = bundle.get_or_insert_with(|| Bundle::EMPTY);
@@ -365,13 +288,7 @@ impl Walk<'_, Nearests<'_>> {
                 let best = nearer(self.mesh, asked, self.answers.hits[ray % RAYS], hit);
                 self.answers.hits[ray % RAYS] = Some(best);
                 self.answers.settled |= 1 << ray;
-                let (t, t_max) = (
-                    Limits::PLAIN.upper(best.lambda + best.error),
-                    &mut self.bundle.rays[ray / 16 % SIXTEENS].t_max[ray % 16],
-                );
-                if t < *t_max {
-                    *t_max = t;
-                }
+                self.bundle.limit(ray, best.lambda + best.error);
             },
         );
     }
@@ -404,7 +321,7 @@ fn any_with<S: Simd>(
     bundle: &mut Option<Bundle>,
     hits: &mut [bool; RAYS],
 ) -> bool {
-    let (to_one_place, alike) = (end_together(rays), go_together(rays));
+    let (to_one_place, alike) = (bvh::end_together(rays), bvh::go_together(rays));
     if !(to_one_place || alike) {
         return false;
     }

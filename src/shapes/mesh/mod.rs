@@ -32,6 +32,14 @@ use std::ops::ControlFlow;
 /// // Exactly through the diagonal, which belongs to both triangles.
 /// let hit = square.intersect(&Ray::new([0.5, 0.5, 3.0], [0.0, 0.0, -1.0]), Interval::FORWARD).unwrap();
 /// assert_eq!((hit.lambda, hit.part), (3.0, 0));
+///
+/// // Many rays in one call are walked together.
+/// let down = |i: u8| (Ray::new([0.5, 0.01 * f64::from(i), 3.0], [0.0, 0.0, -1.0]), Interval::FORWARD);
+/// let rays: Vec<_> = (0..=200).map(down).collect();
+/// let mut hits = vec![None; rays.len()];
+/// square.intersect_each(&rays, &mut hits);
+/// assert_eq!(hits[50], Some(hit));
+/// assert_eq!(hits.iter().flatten().count(), 101);
 /// # Ok::<(), truehit::InvalidShape>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -170,42 +178,6 @@ impl Mesh {
         [position(a), position(b), position(c)]
     }
 
-    /// The nearest hits of many rays: `hits[i]` becomes what [`intersect`](Shape::intersect) answers to `rays[i]`, to the bit.
-    ///
-    /// Rays in a row that go much the same way, such as those of neighbouring pixels, are walked through the tree together,
-    /// which is about three times as fast; most so if they start at one point, a camera, and come in tiles of pixels. Others cost what they cost alone.
-    ///
-    /// ```
-    /// use truehit::{Interval, Mesh, Ray, Shape};
-    /// let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// let mesh = Mesh::new(corners.map(Into::into).to_vec(), vec![[0, 1, 2]])?;
-    /// let rays: Vec<_> = (0..100)
-    ///     .map(|i| (Ray::new([0.3, 0.01 * f64::from(i), 2.0], [0.01, 0.02, -1.0]), Interval::FORWARD))
-    ///     .collect();
-    /// let mut hits = vec![None; rays.len()];
-    /// mesh.intersect_each(&rays, &mut hits);
-    /// assert_eq!(hits[7], mesh.intersect(&rays[7].0, rays[7].1));
-    /// assert_eq!(hits.iter().flatten().count(), 64);
-    /// # Ok::<(), truehit::InvalidShape>(())
-    /// ```
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn intersect_each(&self, rays: &[(Ray, Interval)], hits: &mut [Option<Hit>]) {
-        assert_eq!(rays.len(), hits.len(), "there must be one hit for each ray");
-        each::closest(self, rays, hits);
-    }
-
-    /// Whether many rays hit anything: [`occludes`](Shape::occludes) for each, as [`intersect_each`](Self::intersect_each)
-    /// for [`intersect`](Shape::intersect). Shadow rays of neighbouring pixels to one light do best.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn occludes_each(&self, rays: &[(Ray, Interval)], hits: &mut [bool]) {
-        assert_eq!(rays.len(), hits.len(), "there must be one answer for each ray");
-        each::any(self, rays, hits);
-    }
-
     /// Uses the instructions of `level` from now on, if this CPU has them: for tests and benchmarks. All levels give
     /// the same answers.
     pub fn set_level(&mut self, level: Level) {
@@ -252,6 +224,20 @@ impl Shape for Mesh {
 
     fn occludes(&self, ray: &Ray, within: Interval) -> bool {
         query::any(self, ray, within)
+    }
+
+    /// Rays in a row that go much the same way, such as those of neighbouring pixels, are walked through the tree together,
+    /// which is about three times as fast; most so if they start at one point, a camera, and come in tiles of pixels. Others
+    /// cost what they cost alone. Each answer is the ray's own, to the bit.
+    fn intersect_each(&self, rays: &[(Ray, Interval)], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "there must be one hit for each ray");
+        each::closest(self, rays, hits);
+    }
+
+    /// Shadow rays of neighbouring pixels to one light do best.
+    fn occludes_each(&self, rays: &[(Ray, Interval)], hits: &mut [bool]) {
+        assert_eq!(rays.len(), hits.len(), "there must be one answer for each ray");
+        each::any(self, rays, hits);
     }
 
     fn shading_normal(&self, ray: &Ray, hit: &Hit) -> DVec3 {

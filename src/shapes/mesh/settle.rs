@@ -3,10 +3,9 @@
 //! The filter's margins also say how large the numbers are, so that nobody has to look: docs/numerics.md §4.
 
 use super::Mesh;
-use super::each::Stretch;
 use super::leaf::{Leaf, Margins, PLAIN, Probe, ROTATION, Spot, UNCERTIFIED, column, number};
 use super::query::exactly;
-use crate::bvh::{E, Frame};
+use crate::bvh::{E, Frame, Stretch};
 use crate::kernel::bound::TRIANGLE_CONDITION;
 use crate::kernel::float::power;
 use crate::kernel::rows;

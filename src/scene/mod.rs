@@ -1,5 +1,7 @@
 //! Many shapes, one question: what does the ray meet first?
 
+mod each;
+
 use crate::bvh::{self, Bvh};
 use crate::kernel::eft::two_diff;
 use crate::{Aabb, Hit, Interval, Ray, Shape, Surface};
