@@ -193,3 +193,29 @@ fn observers_see_a_build_advance_and_can_end_it() {
     // Nothing to build is built, too.
     assert!(Bvh::build_observed(&[], &mut |_| ControlFlow::Continue(())).is_some());
 }
+
+/// Where eight boxes are met at each of six levels or more, more wait than have room on one stack.
+#[test]
+fn all_that_are_met_are_visited_once_however_many_wait() {
+    let n = 300_000;
+    let x = |i: usize| i as f64;
+    let boxes: Vec<_> = (0..n).map(|i| Aabb::new([x(i), -1.0, -1.0], [x(i) + 0.5, 1.0, 1.0])).collect();
+    let mut tree = Bvh::build(&boxes);
+    for (name, level) in Level::all() {
+        tree.set_level(level);
+        for (from, to) in [(-1.0, 1.0), (x(n), -1.0)] {
+            let ray = Ray::new([from, 0.0, 0.0], [to, 0.0, 0.0]);
+            let mut visits = vec![0; n];
+            tree.closest(&ray, Interval::FORWARD, |i, bound| {
+                visits[i as usize] += 1;
+                bound
+            });
+            assert!(visits.iter().all(|&v| v == 1), "{name}");
+            assert!(!tree.any(&ray, Interval::FORWARD, |i| {
+                visits[i as usize] += 1;
+                false
+            }));
+            assert!(visits.iter().all(|&v| v == 2), "{name}");
+        }
+    }
+}

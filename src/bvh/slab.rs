@@ -7,7 +7,7 @@
 use super::frame::Frame;
 use crate::kernel::float::power;
 use crate::{Interval, Ray};
-use fearless_simd::{Simd, f32x4, f64x2, prelude::*};
+use fearless_simd::{Simd, f32x4, f64x2, i32x4, prelude::*};
 use glam::DVec3;
 
 /// A ray in the frame of a tree, with what the box and leaf tests need of it: `origin` + t·`direction`.
@@ -73,6 +73,9 @@ const FARTHEST: f64 = 1_125_899_906_842_624.0; // 2⁵⁰
 struct Placed<S: Simd> {
     origin: f32x4<S>,
     direction: f32x4<S>,
+    /// Their largest coordinates.
+    size: f32,
+    length: f32,
     /// See [`LocalRay::origin_error`].
     error: f32,
     /// Slopes 1/direction beyond this are taken for it. A slab is then wider than the ray's stretch near the tree: §10.
@@ -85,12 +88,12 @@ impl LocalRay {
     /// [`uncommon`](Self::uncommon) in a function of its own: what follows is compiled for the constants here.
     #[inline(always)]
     pub(crate) fn new<S: Simd>(simd: S, frame: &Frame, ray: &Ray, within: Interval) -> Option<Self> {
-        let (placed, length) = as_it_is(simd, frame, ray)?;
+        let placed = as_it_is(simd, frame, ray)?;
         // A NaN fails every comparison.
         if !((within.min >= 0.0) & (within.min < within.max)) {
             return None;
         }
-        Some(Self::placed(&placed, length, ray, plain_ends(simd, within)))
+        Some(Self::placed(&placed, plain_ends(simd, within)))
     }
 
     /// Any other ray. `None` where it cannot be expressed in the frame (then every leaf is visited): origins 2⁵⁰ times farther
@@ -100,43 +103,33 @@ impl LocalRay {
         if within.is_empty() {
             return None;
         }
-        let (placed, length) = match as_it_is(simd, frame, ray) {
-            Some(both) => both,
+        let placed = match as_it_is(simd, frame, ray) {
+            Some(placed) => placed,
             None => place(simd, frame, ray)?,
         };
-        let ends = placed.limits.of(simd, within);
-        Some(Self::placed(&placed, length, ray, ends))
+        Some(Self::placed(&placed, placed.limits.of(simd, within)))
     }
 
-    /// `length`: the largest coordinate of the direction. The ends of the interval as of [`Limits::of`].
+    /// The ends of the interval as of [`Limits::of`].
     #[inline(always)]
-    fn placed<S: Simd>(
-        placed: &Placed<S>,
-        length: f32,
-        ray: &Ray,
-        [t_min, sure_max, sure_min, t_max]: [f32; 4],
-    ) -> Self {
-        let &Placed { origin, direction, error, steepest, limits } = placed;
+    fn placed<S: Simd>(placed: &Placed<S>, [t_min, sure_max, sure_min, t_max]: [f32; 4]) -> Self {
+        let &Placed { origin, direction, size, length, error, steepest, limits } = placed;
         let simd = origin.simd;
-        let (one, most) = (f32x4::splat(simd, 1.0), f32x4::splat(simd, steepest));
-        let gentle = direction.abs().simd_lt(1.0 / steepest);
-        let inv = gentle.select(most.copysign(direction), one / direction);
-        let pad = origin.abs().mul_add(f32x4::splat(simd, SLAB), f32x4::splat(simd, SLAB + 2.0 * error));
-        let (middle, half) = (origin * inv, inv.abs() * pad);
-        // The sign that `inv` has. Nodes' rows are known by it long before that.
-        let sign = |x: f64| (x.to_bits() >> 63) as u32;
-        let d = ray.direction;
+        let splat = |x: f32| f32x4::splat(simd, x);
+        let inv = splat(1.0) / direction.abs().max(splat(1.0 / steepest)).copysign(direction);
+        let pad = origin.abs().mul_add(splat(SLAB), splat(SLAB + 2.0 * error));
+        let half = inv.abs() * pad;
         Self {
-            away: sign(d.x) | sign(d.y) << 1 | sign(d.z) << 2,
+            away: direction.bitcast::<i32x4<S>>().simd_lt(i32x4::splat(simd, 0)).to_bitmask() as u32,
             inv: inv.into(),
-            near_shift: (-middle - half).into(),
-            far_shift: (half - middle).into(),
+            near_shift: (-origin.mul_add(inv, half)).into(),
+            far_shift: (-origin).mul_add(inv, half).into(),
             t_min,
             t_max,
             sure: Sure { min: sure_min, max: sure_max },
             origin: origin.into(),
             direction: direction.into(),
-            size: origin.abs().reduce_max(),
+            size,
             length,
             origin_error: error,
             limits,
@@ -204,27 +197,35 @@ impl Sure {
     }
 }
 
-/// A ray in the frame with nothing but roundings, and the largest coordinate of its direction.
+/// A ray in the frame with nothing but roundings.
 #[inline(always)]
-fn as_it_is<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<(Placed<S>, f32)> {
+fn as_it_is<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<Placed<S>> {
     let pair = |x: f64, y: f64| f64x2::<S>::simd_from(simd, [x, y]);
     let (o, d, c) = (ray.origin, ray.direction, frame.center);
     let direction = (pair(d.x, d.y) * frame.scale).relaxed_narrow(pair(d.z, 0.0) * frame.scale);
     let origin = ((pair(o.x, o.y) - pair(c.x, c.y)) * frame.scale)
         .relaxed_narrow((pair(o.z, 0.0) - pair(c.z, 0.0)) * frame.scale);
-    let length = direction.abs().reduce_max();
+    let [size, length] = sizes(origin, direction);
     let near = origin.abs().simd_le(NEAR) & direction.abs().simd_le(LENGTHS[1]);
     // A NaN fails every comparison.
     if !((near.to_bitmask() == 0xf) & (length >= LENGTHS[0])) {
         return None;
     }
-    let placed = Placed { origin, direction, error: PLAIN_ERROR, steepest: STEEPEST, limits: Limits::PLAIN };
-    Some((placed, length))
+    Some(Placed { origin, direction, size, length, error: PLAIN_ERROR, steepest: STEEPEST, limits: Limits::PLAIN })
+}
+
+/// The largest coordinates of two vectors whose fourth are zero, found beside each other; a NaN may be lost.
+#[inline(always)]
+fn sizes<S: Simd>(a: f32x4<S>, b: f32x4<S>) -> [f32; 2] {
+    let (a, b) = (a.abs(), b.abs());
+    let two = a.zip_low(b).max(a.zip_high(b));
+    let [of_a, of_b, ..]: [f32; 4] = two.max(two.slide::<2>(two)).into();
+    [of_a, of_b]
 }
 
 /// Rays from far outside, and with very long or short directions; as [`as_it_is`].
 #[inline(always)]
-fn place<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<(Placed<S>, f32)> {
+fn place<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<Placed<S>> {
     let e = exponent_of_normal(largest(ray.direction));
     let k = e - frame.exponent;
     // A zero or subnormal direction has e = −1023, an infinite one e = 1024.
@@ -245,16 +246,18 @@ fn place<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<(Placed<S>, f32)>
     }
     let narrow =
         |v: DVec3| f64x2::<S>::simd_from(simd, [v.x, v.y]).relaxed_narrow(f64x2::<S>::simd_from(simd, [v.z, 0.0]));
-    let direction = narrow(direction);
-    let placed = Placed {
-        origin: narrow(origin),
+    let (origin, direction) = (narrow(origin), narrow(direction));
+    let [size, length] = sizes(origin, direction);
+    Some(Placed {
+        origin,
         direction,
+        size,
+        length,
         // u·(|start| + |t·direction| + |origin|) ≤ u·(1 + 2 + 3)·reach, and the underflow of all; up by 2⁻¹⁰.
         error: (4.004 * f64::EPSILON * reach + f64::from(f32::MIN_POSITIVE)) as f32,
         steepest: LENGTHS[1],
         limits: Limits { stretch: power(k), advance },
-    };
-    Some((placed, direction.abs().reduce_max()))
+    })
 }
 
 /// The ray moved to where its steepest coordinate is zero, and by how much: the whole tree lies within ±1 of there.

@@ -212,7 +212,7 @@ pub(crate) fn closest<S: Simd, const FORWARD: bool>(
                 at = NONE;
                 break;
             }
-            let (enter, child) = (Row::of(enter), Row::of(node.row(simd, CHILDREN as u32)));
+            let child = Row::of(node.row(simd, CHILDREN as u32));
             let child = |lane: usize| child.lane(lane).to_bits();
             let first = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
@@ -221,6 +221,7 @@ pub(crate) fn closest<S: Simd, const FORWARD: bool>(
                 continue;
             }
             stack.reserve();
+            let enter = Row::of(enter);
             let second = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
             let (a, b) = (entry(child(first), enter.lane(first)), entry(child(second), enter.lane(second)));

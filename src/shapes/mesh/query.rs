@@ -240,24 +240,33 @@ impl<'a> Nearest<'a> {
         }
     }
 
-    /// Considers a triangle that may be met between the t of `depth`; `through`: whose inside the line certainly passes.
+    /// Considers a triangle that may be met between the t of `depth`; `through`: whose inside the line certainly passes. Elsewhere the
+    /// sign of the denominator is not known, and the depths mean nothing.
     #[inline(always)]
-    fn consider<S: Simd>(&mut self, simd: S, spot: Spot, through: bool, [low, high]: [f32; 2]) {
-        // Elsewhere the sign of the denominator is not known, and the depths mean nothing.
-        if through && low > self.t_max {
-            return;
+    fn consider<S: Simd>(&mut self, simd: S, spot: Spot, through: bool, depth: [f32; 2]) {
+        if self.count == MOST_PASSED {
+            self.decide(simd);
         }
-        if !(through && self.sure.holds([low, high])) {
-            return self.confirm(simd, spot);
+        if !(through && self.remember(spot, depth)) {
+            self.confirm(simd, spot);
+        }
+    }
+
+    /// Whether no more is to be done at once with a triangle that the line certainly passes through: it is too far, or certainly a hit.
+    #[inline(always)]
+    fn remember(&mut self, spot: Spot, [low, high]: [f32; 2]) -> bool {
+        if low > self.t_max {
+            return true;
+        }
+        if !self.sure.holds([low, high]) | (self.count == MOST_PASSED) {
+            return false;
         }
         if high < self.t_max {
             self.t_max = high;
         }
-        if self.count == MOST_PASSED {
-            self.decide(simd);
-        }
         self.passed[self.count % MOST_PASSED] = Passed { spot, t: low };
         self.count += 1;
+        true
     }
 
     /// Decides the triangles that are still in question.
@@ -319,7 +328,12 @@ impl Single<'_> {
             #[inline(always)]
             move || {
                 let triangles = &self.nearest.mesh.leaves[leaf as usize];
-                if let Some(outcome) = self.probe.test(simd, triangles, self.nearest.t_max) {
+                let Some(outcome) = self.probe.test(simd, triangles, self.nearest.t_max) else { return };
+                let &Outcome { maybe, through, ref depths } = &outcome;
+                // Most often it is one.
+                let lane = maybe.trailing_zeros();
+                let alone = maybe.is_power_of_two() & (through >> lane & 1 == 1);
+                if !(alone && self.nearest.remember(Spot { leaf, lane }, depths.interval(lane as usize))) {
                     self.candidates(simd, leaf, &outcome);
                 }
             },
