@@ -192,9 +192,10 @@ fn slices_are_answered_as_their_rays_are() {
     for (positions, triangles) in meshes.into_iter().chain([far]) {
         let mut mesh = Mesh::new(positions, triangles).unwrap();
         for _ in 0..400 {
-            let rays = tile(&mesh, &mut random);
+            // Whole bundles, and what is left of a slice.
+            let rays = &tile(&mesh, &mut random)[..96 - random.index(32)];
             rays_in_all += rays.len();
-            hits_in_all += answered_alike(&mut mesh, &rays);
+            hits_in_all += answered_alike(&mut mesh, rays);
         }
     }
     println!("{rays_in_all} rays in slices, {hits_in_all} hits, {} levels, 0 differences", Level::all().len());
