@@ -62,10 +62,16 @@ fn flat_kernels(criterion: &mut Criterion) {
     group.finish();
 
     let cases = triangles(5.0, 1.0);
-    let mut group = criterion.benchmark_group("plane");
-    each(&mut group, "textbook", &cases, |(ray, t)| textbook::plane::<f64>(ray, t[0], t[1], FORWARD));
-    each(&mut group, "shipped", &cases, |(ray, t)| plane::intersect(ray, t[0], t[1], FORWARD));
-    group.finish();
+    // Aimed at points beside the plane, which nearly all rays meet in front of them; or every other ray turned away.
+    let either_way: Vec<Case> = cases
+        .iter()
+        .map(|(ray, t)| (Ray::new(ray.origin, if r.fraction() < 0.5 { -ray.direction } else { ray.direction }), *t))
+        .collect();
+    for (name, cases) in [("plane, half hit", &either_way), ("plane, nearly all hit", &cases)] {
+        let mut group = criterion.benchmark_group(name);
+        each(&mut group, "textbook", cases, |(ray, t)| textbook::plane::<f64>(ray, t[0], t[1], FORWARD));
+        each(&mut group, "shipped", cases, |(ray, t)| plane::intersect(ray, t[0], t[1], FORWARD));
+    }
 
     let boxes: Vec<(Ray, [DVec3; 2])> = cases.iter().map(|(ray, t)| (*ray, [t[0].min(t[1]), t[0].max(t[1])])).collect();
     let entry = |(lambda, _)| Hit { lambda, error: 0.0, uv: truehit::glam::DVec2::ZERO, part: 0 };

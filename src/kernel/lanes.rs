@@ -19,6 +19,8 @@ pub trait Two: Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     /// |self|.
     #[must_use]
     fn abs(self) -> Self;
+    /// Whether self ≤ other in either lane: a NaN is not.
+    fn any_le(self, other: Self) -> bool;
     /// Whether least < self < most in both lanes: a NaN anywhere is not.
     fn is_between(self, least: Self, most: f64) -> bool;
 }
@@ -207,6 +209,11 @@ impl<S: Simd> Two for f64x2<S> {
     }
 
     #[inline(always)]
+    fn any_le(self, other: Self) -> bool {
+        self.simd.any_true_mask64x2(self.simd.simd_le_f64x2(self, other))
+    }
+
+    #[inline(always)]
     fn is_between(self, least: Self, most: f64) -> bool {
         let cpu = self.simd;
         let (above, below) = (cpu.simd_lt_f64x2(least, self), cpu.simd_lt_f64x2(self, self.splat(most)));
@@ -318,6 +325,12 @@ impl Two for Plain<2> {
     #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.map(f64::abs))
+    }
+
+    #[inline(always)]
+    fn any_le(self, other: Self) -> bool {
+        let ([a, b], [c, d]) = (self.0, other.0);
+        (a <= c) | (b <= d)
     }
 
     #[inline(always)]

@@ -3,7 +3,7 @@
 //! Both dot products are compensated (Ogita, Rump, Oishi 2005) with the rounding errors of p−o; one remainder step makes
 //! the quotient of the double-doubles. docs/numerics.md §3.
 
-use super::bound::{PLANE_CONDITION, PLANE_LAMBDA, PLANE_QUOTIENT, U, UNDERFLOW};
+use super::bound::{LARGE, PLANE_CONDITION, PLANE_LAMBDA, PLANE_QUOTIENT, U, UNDERFLOW};
 use super::cpu;
 use super::eft::{Fused, Product, Split, two_diff, two_sum};
 use super::float::{exponent_of, ldexp, power};
@@ -43,7 +43,7 @@ fn fast<P: Product>(
     normal: &DVec3,
     within: &Interval,
 ) -> Option<Hit> {
-    match quotient::<P, false>(cpu, ray, point, normal, None, *within) {
+    match quotient::<P>(cpu, ray, point, normal, None, within) {
         Quotient::Outside => None,
         Quotient::Inside { lambda, error } => Some(Hit { lambda, error, uv: DVec2::ZERO, part: 0 }),
         Quotient::Uncertain => refine(ray, point, normal, within),
@@ -61,24 +61,35 @@ pub(super) enum Quotient {
     Uncertain,
 }
 
-/// λ = `q` + `correction` to within `beyond_rounding`, before it is rounded.
+/// n·d and n·(p − o) side by side, in this order.
+#[derive(Clone, Copy, Debug)]
+struct Dots<H> {
+    /// The products of components, x, z, y: of x + y the compiler would make a horizontal sum, which takes longer.
+    terms: [H; 3],
+    /// Their sums, rounded.
+    sums: H,
+    /// What is to be added.
+    low: H,
+}
+
+/// λ = `q` + `correction`, before it is rounded.
 #[derive(Clone, Copy, Debug)]
 struct Solved {
     q: f64,
     correction: f64,
-    beyond_rounding: f64,
+    /// 1/D
+    inverse: f64,
 }
 
-/// n·(p−o)/n·d, the normal a float vector, or a double-double that is off by at most 2u² of each component. `CLOSE` has the
-/// sharper bound, which costs a little more and knows planes that are nearly grazed, and origins next to them.
+/// The normal is a float vector, or a double-double that is off by at most 2u² of each component.
 #[inline(always)]
-fn solve<P: Product, const CLOSE: bool>(
+fn dots<P: Product>(
     cpu: <P::Lanes as Lanes>::Cpu,
     ray: &Ray,
     point: &DVec3,
     n: &DVec3,
     n_lo: Option<&DVec3>,
-) -> Option<Solved> {
+) -> Dots<<P::Lanes as Lanes>::Half> {
     let lanes = |v: &DVec3| P::Lanes::of(cpu, *v);
     let (d, s) = (lanes(&ray.direction), Double::difference(lanes(point), lanes(&ray.origin)));
     let (nd, ns) = match n_lo {
@@ -88,65 +99,79 @@ fn solve<P: Product, const CLOSE: bool>(
             (n.times_float(d), n.times(s))
         }
     };
-    // The denominator and the numerator side by side.
-    let [x, y, z] = nd.hi.rows(ns.hi);
-    let (xy, rounding) = two_sum(x, y);
-    let (sums, more_rounding) = two_sum(xy, z);
-    let sizes = (x.abs() + y.abs()) + z.abs();
-    let [den, num] = sums.to_array();
-    let inverse = 1.0 / den;
-    let q = num * inverse;
+    let ([x, y, z], [x_lo, y_lo, z_lo]) = (nd.hi.rows(ns.hi), nd.lo.rows(ns.lo));
+    let (xz, rounding) = two_sum(x, z);
+    let (sums, more_rounding) = two_sum(xz, y);
+    Dots { terms: [x, z, y], sums, low: (rounding + more_rounding) + ((x_lo + z_lo) + y_lo) }
+}
 
-    // Proved before it is computed.
-    let (beyond_rounding, known) = if CLOSE {
-        let [den_size, num_size] = sizes.to_array();
+impl<H: Two> Dots<H> {
+    /// Neither sum has lost more than 18 of its bits, nor anything that counts to underflow. An overflow is not seen here.
+    #[inline(always)]
+    fn are_known(&self) -> bool {
+        let &Self { terms: [x, z, _], sums, .. } = self;
+        // The third term is no larger than the sum and the first two.
+        let least = (x.abs() + z.abs()) * sums.splat(4.0 / PLANE_CONDITION) + sums.splat(PRESENT);
+        !sums.abs().any_le(least)
+    }
+
+    /// Of sums that are known: whether λ is below zero, before anything is divided.
+    #[inline(always)]
+    fn are_behind(&self) -> bool {
+        let [den, num] = self.sums.to_array();
+        // After an overflow the sign of a sum may be wrong.
+        den * num < 0.0 && den * num > -LARGE
+    }
+
+    #[inline(always)]
+    fn solve<P: Product>(&self) -> Solved {
+        let ([den, num], [den_lo, num_lo]) = (self.sums.to_array(), self.low.to_array());
+        let inverse = 1.0 / den;
+        let q = num * inverse;
+        let remainder = P::remainder(num, q, den) + (num_lo - q * den_lo);
+        Solved { q, correction: remainder * inverse, inverse }
+    }
+
+    /// A sharp bound on what λ is off before it is rounded, if that is little enough.
+    #[inline(always)]
+    fn beyond_rounding(&self, &Solved { q, inverse, .. }: &Solved, ray: &Ray, point: &DVec3) -> Option<f64> {
+        let [x, z, y] = self.terms;
+        let [den_size, num_size] = ((x.abs() + z.abs()) + y.abs()).to_array();
         let (over, size) = (inverse.abs(), num_size + q.abs() * den_size);
         let kappa = den_size * over;
         let beyond_rounding = PLANE_QUOTIENT * kappa * (over * size);
         let [md, ms] = [ray.direction, *point - ray.origin].map(|v| v.abs().max_element());
         let tiny = beyond_rounding * md < FLOOR * ms;
         let known = ((beyond_rounding < 0.25 * U * q.abs()) | tiny) & (kappa < 1.0 / (64.0 * U));
-        (beyond_rounding, known & (den.abs() > PRESENT) & (q.abs() > PRESENT))
-    } else {
-        // Neither sum has lost more than 18 of its bits, nor anything that counts to underflow.
-        let least = sizes + sizes.splat(PLANE_CONDITION * PRESENT);
-        let known = (sums.abs() * sums.splat(PLANE_CONDITION)).is_between(least, PLANE_CONDITION / PRESENT);
-        (PLANE_LAMBDA * q.abs(), known)
-    };
-    if !known {
-        return None;
+        let [den, _] = self.sums.to_array();
+        (known & (den.abs() > PRESENT) & (q.abs() > PRESENT)).then_some(beyond_rounding)
     }
-    let [lx, ly, lz] = nd.lo.rows(ns.lo);
-    let [den_lo, num_lo] = ((rounding + more_rounding) + ((lx + ly) + lz)).to_array();
-    let remainder = P::remainder(num, q, den) + (num_lo - q * den_lo);
-    Some(Solved { q, correction: remainder * inverse, beyond_rounding })
 }
 
 /// λ against the interval.
 #[inline(always)]
-pub(super) fn quotient<P: Product, const CLOSE: bool>(
+pub(super) fn quotient<P: Product>(
     cpu: <P::Lanes as Lanes>::Cpu,
     ray: &Ray,
     point: &DVec3,
     n: &DVec3,
     n_lo: Option<&DVec3>,
-    within: Interval,
+    within: &Interval,
 ) -> Quotient {
-    let Some(Solved { q, correction, beyond_rounding }) = solve::<P, CLOSE>(cpu, ray, point, n, n_lo) else {
+    let dots = dots::<P>(cpu, ray, point, n, n_lo);
+    if !dots.are_known() {
         return Quotient::Uncertain;
-    };
-    let lambda = q + correction;
-    let error = if CLOSE { (U * q.abs() + beyond_rounding) * (1.0 + 8.0 * U) } else { (U + PLANE_LAMBDA) * q.abs() };
-    if (lambda - error > within.min) & (lambda + error < within.max) {
-        return Quotient::Inside { lambda, error };
     }
-    if (lambda + error < within.min) | (lambda - error > within.max) {
+    // Half of all rays, and a branch that nothing foretells: it is not kept waiting for the division.
+    if dots.are_behind() && within.min >= 0.0 {
         return Quotient::Outside;
     }
-    Quotient::Uncertain
+    let Solved { q, correction, .. } = dots.solve::<P>();
+    let error = (U + PLANE_LAMBDA) * q.abs();
+    if error > (U + PLANE_LAMBDA) * PRESENT { place(q + correction, error, within) } else { Quotient::Uncertain }
 }
 
-/// [`quotient`] with the sharper bound.
+/// [`quotient`] with a sharper bound, which knows planes that are nearly grazed, and origins next to them.
 pub(super) fn quotient_closely(
     ray: &Ray,
     point: &DVec3,
@@ -156,10 +181,37 @@ pub(super) fn quotient_closely(
 ) -> Quotient {
     cpu::dispatch_lanes(
         #[inline(always)]
-        |cpu| quotient::<Fused, true>(cpu, ray, point, n, n_lo, within),
+        |cpu| closely::<Fused>(cpu, ray, point, n, n_lo, within),
         #[inline(always)]
-        || quotient::<Split, true>((), ray, point, n, n_lo, within),
+        || closely::<Split>((), ray, point, n, n_lo, within),
     )
+}
+
+#[inline(always)]
+fn closely<P: Product>(
+    cpu: <P::Lanes as Lanes>::Cpu,
+    ray: &Ray,
+    point: &DVec3,
+    n: &DVec3,
+    n_lo: Option<&DVec3>,
+    within: Interval,
+) -> Quotient {
+    let dots = dots::<P>(cpu, ray, point, n, n_lo);
+    let solved = dots.solve::<P>();
+    let Some(beyond_rounding) = dots.beyond_rounding(&solved, ray, point) else { return Quotient::Uncertain };
+    let error = (U * solved.q.abs() + beyond_rounding) * (1.0 + 8.0 * U);
+    place(solved.q + solved.correction, error, &within)
+}
+
+#[inline(always)]
+fn place(lambda: f64, error: f64, within: &Interval) -> Quotient {
+    if (lambda - error > within.min) & (lambda + error < within.max) {
+        return Quotient::Inside { lambda, error };
+    }
+    if (lambda + error < within.min) | (lambda - error > within.max) {
+        return Quotient::Outside;
+    }
+    Quotient::Uncertain
 }
 
 /// λ need not be better known than to ½u·2⁻⁴⁴ of the distance to `point` over the direction's length.
@@ -296,7 +348,13 @@ mod tests {
     /// |error of λ before its rounding|/bound, for the answers that are given.
     fn off<const CLOSE: bool>(x: &[f64]) -> Option<f64> {
         let (ray, point, normal) = setting(x);
-        let Solved { q, correction, beyond_rounding } = solve::<Split, CLOSE>((), &ray, &point, &normal, None)?;
+        let dots = dots::<Split>((), &ray, &point, &normal, None);
+        let solved @ Solved { q, correction, .. } = dots.solve::<Split>();
+        let beyond_rounding = if CLOSE {
+            dots.beyond_rounding(&solved, &ray, &point)?
+        } else {
+            dots.are_known().then_some(PLANE_LAMBDA * q.abs())?
+        };
         let n = exact(normal);
         let lambda = dot3(&n, &minus(point, ray.origin)) / dot3(&n, &exact(ray.direction));
         let [q, correction] = [q, correction].map(|x| Rational::try_from(x).unwrap());
@@ -310,6 +368,15 @@ mod tests {
         assert!(worst < 1.0);
         let worst = climb("plane: λ, closely", 14, off::<true>);
         assert!((0.003..1.0).contains(&worst));
+    }
+
+    /// p − o overflows to +∞, n·(p − o) does not and is below zero.
+    #[test]
+    fn an_overflow_is_not_taken_for_a_miss() {
+        let (point, normal) = (DVec3::new(-1e10, 1.7e308, 0.0), DVec3::new(1.0, 1e-300, 0.0));
+        let ray = Ray { origin: DVec3::new(0.0, -1.7e308, 0.0), direction: -DVec3::X };
+        let hit = intersect(&ray, point, normal, Interval::FORWARD).expect("a hit");
+        assert_eq!(hit.lambda, 1e10 - 3.4e8);
     }
 
     #[test]

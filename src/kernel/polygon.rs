@@ -142,7 +142,7 @@ pub fn intersect(ray: &Ray, polygon: &Contours, within: Interval) -> Option<Hit>
 #[must_use]
 pub fn intersect_with<P: Product>(ray: &Ray, polygon: &Contours, within: Interval) -> Option<Hit> {
     let [n, n_lo] = &polygon.normal;
-    match quotient::<P, false>(P::cpu(), ray, &polygon.vertices[0], n, Some(n_lo), within) {
+    match quotient::<P>(P::cpu(), ray, &polygon.vertices[0], n, Some(n_lo), &within) {
         Quotient::Outside => None,
         Quotient::Inside { lambda, error } => {
             let hit = Hit { lambda, error, uv: DVec2::ZERO, part: 0 };
