@@ -388,7 +388,7 @@ mod tests {
             let v = |i: usize| DVec3::new(x[i], x[i + 1], x[i + 2]);
             for (length, size) in [(90, -980), (59, -1000), (-59, -1000), (70, 950), (0, 0)] {
                 let (n, point) = (power(length) * v(0), power(size) * v(3));
-                let near = point + power(size) * v(6).cross(v(0));
+                let near = point + power(size) * (v(6).cross(v(0)) + x[3] * v(0));
                 let (moved, error) = project(point, [n, DVec3::ZERO], near);
                 let height = dot3(&exact(v(0)), &minus(moved, point)) / Rational::try_from(v(0).length()).unwrap();
                 let ratio = height / Rational::try_from(error).unwrap();
