@@ -152,10 +152,10 @@ impl<S: Shape> Affine<S> {
         let SurfacePoint { position, error } = object;
         let world = transform_point(&self.world_from_innermost, position);
         let (w, t) = (self.world_from_innermost.matrix3, self.world_from_innermost.translation);
-        // The map's entries are rounded, and so is the sum.
+        // The map's entries are rounded, and so is the sum; products may be subnormal.
         let size =
             w.x_axis.abs() * position.x.abs() + w.y_axis.abs() * position.y.abs() + w.z_axis.abs() * position.z.abs();
-        let rounding = U * (taxicab(world) + 2.0 * taxicab(size + t.abs()));
+        let rounding = U * (taxicab(world) + 2.0 * taxicab(size + t.abs())) + f64::from_bits(64);
         // An object-space error ε is at most ‖W‖ε here; along the normal, where it lies, it is ε/|Mᵀn|.
         let stretched = error * largest_stretch(&w);
         let along = 1.01 * error / shrunk;
@@ -344,6 +344,15 @@ impl<S: Shape> Shape for Affine<S> {
         self.innermost().intersect_each(&zoned, hits);
         for (i, hit) in hits.iter_mut().enumerate() {
             *hit = hit.and_then(|hit| self.answer(&images[i], hit, zoned[i].1, rays[i].1));
+        }
+    }
+
+    fn occludes_each(&self, rays: &[(Ray, Interval)], hits: &mut [bool]) {
+        assert_eq!(rays.len(), hits.len(), "there must be one answer for each ray");
+        let mut found = vec![None; rays.len()];
+        self.intersect_each(rays, &mut found);
+        for (hit, found) in hits.iter_mut().zip(&found) {
+            *hit = found.is_some();
         }
     }
 

@@ -76,7 +76,7 @@ impl<'a> Surface<'a> {
     }
 
     /// A ray from the surface to `target`, which it reaches at λ = 1: a shadow ray, to be traced over
-    /// `Interval::new(0.0, 1.0)`.
+    /// `Interval::new(0.0, 1.0)`. To a target as near to the surface's plane as rounding is, the ray may meet that surface again.
     #[must_use]
     pub fn spawn_to(&self, target: DVec3) -> Ray {
         self.leave(target - self.point, |origin| target - origin)
@@ -102,7 +102,7 @@ impl<'a> Surface<'a> {
         }
         // A target that the surface itself hides, or that its ray reaches before coming down to the surface: only the
         // origin can be clear of it.
-        let clear = |ray: &Ray| departs(&Ray { direction: away(outward), ..*ray }, outward);
+        let clear = |ray: &Ray| ray.is_valid() && departs(&Ray { direction: away(outward), ..*ray }, outward);
         if let Some(ray) = steps().map(|step| from(outward, step)).find(clear) {
             return ray;
         }

@@ -250,3 +250,15 @@ fn spawned_rays_leave() {
 fn a_hundred_million_spawned_rays_leave() {
     sweep(support::cases_wanted(700_000));
 }
+
+#[test]
+fn a_target_at_the_origin_itself_is_left_for() {
+    let floor = Plane::new([0.0; 3], [0.0, 1.0, 0.0]).unwrap();
+    let down = Ray::new([1.0, 1.0, 0.0], [0.0, -1.0, 0.0]);
+    let hit = floor.intersect(&down, Interval::FORWARD).unwrap();
+    let surface = Surface::new(&floor, &down, &hit);
+    for k in 0..200 {
+        let target = DVec3::new(1.0, f64::from(k) * 2f64.powi(-54), 0.0);
+        assert!(surface.spawn_to(target).is_valid(), "{k}");
+    }
+}

@@ -313,6 +313,9 @@ impl Bundle {
             (t_min[i], t_max[i]) = (sixteen.t_min.simd_into(simd), sixteen.t_max.simd_into(simd));
             long &= all_long;
         }
+        for ray in many..RAYS {
+            self.rays[ray / 16].t_max[ray % 16] = f32::NEG_INFINITY;
+        }
         let (origins, mut directions, finite) = extent.of_all();
         if from == Start::End {
             for [low, high] in &mut directions {

@@ -32,6 +32,24 @@ pub const TRIANGLE_LAMBDA: f64 = U / 16.0;
 /// and λ, beyond its last rounding, by this times (|e₁||e₂|/|D|)·(|s| + |λ||d|).
 pub const TRIANGLE_CLOSE: f64 = 600.0 * U * U;
 
+/// A triangle's edges, and differences and directions in triple products, stay below this, together: nothing overflows, and underflow takes
+/// less than [`VANISHED`].
+pub const LARGEST: f64 = f64::from_bits((1023 + 250) << 52);
+
+/// Triple products of numbers below [`LARGEST`] lose less than 2⁻⁸²⁰ by underflow: nothing if they are above this.
+pub const VANISHED: f64 = f64::from_bits((1023 - 640) << 52);
+
+/// Triangle, docs/numerics.md §4: the normal is off by 28u²|e₁||e₂|; if its largest component is above this times |e₁||e₂|, by less
+/// than u of that.
+pub const TRIANGLE_THICK: f64 = 64.0 * U;
+
+/// Leaving a plane, docs/numerics.md §11: the height n·(o − p) is off by at most this times M·|o − p|, in largest components; M is a
+/// triangle's |e₁||e₂| or the size of a given normal.
+pub const LEAVING_HEIGHT: f64 = 400.0 * U * U;
+
+/// Leaving a plane, docs/numerics.md §11: and n·d by this times M·|d|.
+pub const LEAVING_SLOPE: f64 = 50.0 * U;
+
 /// Plane, docs/numerics.md §3: the fast path takes a ray if the sums of absolute products are below this times |D| and |N|.
 pub const PLANE_CONDITION: f64 = (1 << 18) as f64;
 

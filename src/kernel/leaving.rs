@@ -4,22 +4,13 @@
 //! direction leads away is an ordinary dot product. Where one of the two is not certain the exact test has to say:
 //! docs/numerics.md §11.
 
-use super::bound::U;
+use super::bound::{LARGEST, LEAVING_HEIGHT as HEIGHT, LEAVING_SLOPE as SLOPE, VANISHED};
 use super::cpu;
 use super::eft::{Product, two_sum};
-use super::float::power;
 use super::lanes::{Double, Lanes};
 use crate::Ray;
 use glam::DVec3;
-
-/// The height n·(o − p) is off by at most this times M·|o − p|, in largest components; M is a triangle's |e₁||e₂| or the
-/// size of a given normal.
-const HEIGHT: f64 = 400.0 * U * U;
-/// And n·d by this times M·|d|.
-const SLOPE: f64 = 50.0 * U;
-/// Sizes that are below this together overflow nowhere, and what underflow takes is below [`VANISHED`].
-const LARGEST: f64 = power(250);
-const VANISHED: f64 = power(-640);
+use std::cmp::Ordering;
 
 /// Whether a ray that starts strictly on the side of the plane that n points to (`outward`), or on the other, moves away from
 /// it: then it never meets the plane. `None` where that is not certain. The plane goes through `point`; its normal is
@@ -35,6 +26,11 @@ pub(super) fn plane(ray: &Ray, point: &DVec3, normal: &[DVec3; 2], outward: bool
 #[must_use]
 pub(super) fn triangle(ray: &Ray, vertices: &[DVec3; 3], outward: bool) -> Option<bool> {
     cpu::dispatch_function!(of_triangle(ray: &Ray, vertices: &[DVec3; 3], outward: bool) -> Option<bool>)
+}
+
+/// Which side that is.
+pub(super) fn side(outward: bool) -> Ordering {
+    if outward { Ordering::Greater } else { Ordering::Less }
 }
 
 #[inline(always)]
@@ -66,7 +62,8 @@ pub(super) fn normal<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, vertices: &[DVec
     let [a, b, c] = vertices.map(|v| P::Lanes::of(cpu, v));
     let (e1, e2) = (Double::difference(b, a), Double::difference(c, a));
     let [m1, m2, ..] = P::Lanes::largest([e1.hi, e2.hi, e1.hi, e2.hi]).to_array();
-    (e1.cross(e2), m1 * m2)
+    // So large that they might not even be multiplied: no size at all.
+    (e1.cross(e2), if m1 + m2 < LARGEST { m1 * m2 } else { f64::INFINITY })
 }
 
 #[inline(always)]
@@ -118,7 +115,6 @@ mod tests {
     use super::super::{plane, triangle};
     use super::*;
     use crate::Interval;
-    use std::cmp::Ordering;
 
     /// A ray from x₁₃, a triangle from x₀, next to its plane by x₁₂.
     fn setting(x: &[f64]) -> (Ray, [DVec3; 3]) {
@@ -155,6 +151,18 @@ mod tests {
         assert!((0.01..1.0).contains(&worst));
     }
 
+    /// Edges that overflow in splitting are not ordinary, whatever their product is.
+    #[test]
+    fn edges_too_long_to_be_split_are_left_to_others() {
+        let long = DVec3::new(2f64.powi(995), 2f64.powi(994), 2f64.powi(1000));
+        let vertices = [DVec3::ZERO, long, 2f64.powi(-700) * DVec3::new(0.3, 1.0, 1.0)];
+        let (_, size) = normal::<Split>((), &vertices);
+        assert_eq!(size, f64::INFINITY);
+        assert!((triangle::normal(&vertices).length() - 1.0).abs() < 1e-15);
+        let ray = Ray { origin: long, direction: DVec3::Y };
+        assert_eq!(of_triangle::<Split>((), &ray, &vertices, true), None);
+    }
+
     /// The quick answer is that of the two exact questions, and nearly always there is one.
     #[test]
     fn what_is_certain_is_true() {
@@ -164,7 +172,7 @@ mod tests {
             let n = triangle::normal(&vertices);
             let as_plane = plane::intersect(&ray, vertices[0], n, Interval::FORWARD).is_none();
             for outward in [false, true] {
-                let beyond = if outward { Ordering::Greater } else { Ordering::Less };
+                let beyond = side(outward);
                 let exactly = triangle::side(&vertices, ray.origin) == beyond
                     && triangle::intersect(&ray, &vertices, Interval::FORWARD).is_none();
                 assert_eq!(triangle::departs(&ray, &vertices, outward), exactly, "{ray:?} {vertices:?}");

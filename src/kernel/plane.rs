@@ -284,9 +284,8 @@ pub fn side(point: DVec3, normal: DVec3, x: DVec3) -> Ordering {
 #[must_use]
 pub fn departs(ray: &Ray, point: DVec3, normal: DVec3, outward: bool) -> bool {
     leaving::plane(ray, &point, &[normal, DVec3::ZERO], outward).unwrap_or_else(|| {
-        let beyond = if outward { Ordering::Greater } else { Ordering::Less };
         ray.is_valid()
-            && side(point, normal, ray.origin) == beyond
+            && side(point, normal, ray.origin) == leaving::side(outward)
             && intersect(ray, point, normal, Interval::FORWARD).is_none()
     })
 }
@@ -298,8 +297,8 @@ pub fn departs(ray: &Ray, point: DVec3, normal: DVec3, outward: bool) -> bool {
 pub fn project(point: DVec3, [n, n_lo]: [DVec3; 2], x: DVec3) -> (DVec3, f64) {
     // Powers of two make the normal short enough to be squared, and keep the largest coordinates from overflowing.
     let (length, far) = (n.abs().max_element(), x.abs().max(point.abs()).max_element() > power(900));
-    // Longer, and what a subnormal multiple of it has lost would be more than `UNDERFLOW`.
-    if (power(-60)..power(60)).contains(&length) && !far {
+    // Of a longer one a subnormal multiple would lose more than `UNDERFLOW`, which a shorter one would make more of.
+    if (power(-10)..power(60)).contains(&length) && !far {
         return foot(point, [n, n_lo], x);
     }
     let scaled = |v: DVec3| v.map(|x| ldexp(x, -exponent_of(length)));
@@ -310,6 +309,11 @@ pub fn project(point: DVec3, [n, n_lo]: [DVec3; 2], x: DVec3) -> (DVec3, f64) {
 
 /// [`project`] where nothing overflows.
 fn foot(point: DVec3, normal: [DVec3; 2], x: DVec3) -> (DVec3, f64) {
+    // Products so small that their low parts vanish would have other bits.
+    let vanishing = |x: f64| x != 0.0 && x.abs() < power(-850);
+    if (x - point).to_array().into_iter().any(vanishing) {
+        return foot_with::<Split>(point, normal, x);
+    }
     cpu::dispatch(
         #[inline(always)]
         move || foot_with::<Fused>(point, normal, x),
@@ -325,7 +329,7 @@ fn foot_with<P: Product>(point: DVec3, [n, n_lo]: [DVec3; 2], x: DVec3) -> (DVec
     let (h, h_lo, size) = dot2::<P>(n, s, n.dot(s_lo) + n_lo.dot(s));
     let (h, length) = (h + h_lo, n.length());
     let moved = x - n * (h / (length * length));
-    let off = (34.0 * U * U * size + 8.0 * U * h.abs() + UNDERFLOW) / length + UNDERFLOW;
+    let off = (34.0 * U * U * size + 10.0 * U * h.abs() + UNDERFLOW) / length + UNDERFLOW;
     let rounding = U * n.abs().dot(moved.abs()) / length;
     (moved, (off + rounding) * (1.0 + 16.0 * U))
 }

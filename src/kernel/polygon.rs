@@ -100,8 +100,9 @@ impl Contours {
     #[must_use]
     pub fn departs(&self, ray: &Ray, outward: bool) -> bool {
         leaving::plane(ray, &self.vertices[0], &self.normal, outward).unwrap_or_else(|| {
-            let beyond = if outward { Ordering::Greater } else { Ordering::Less };
-            ray.is_valid() && self.side(ray.origin) == beyond && intersect(ray, self, Interval::FORWARD).is_none()
+            ray.is_valid()
+                && self.side(ray.origin) == leaving::side(outward)
+                && intersect(ray, self, Interval::FORWARD).is_none()
         })
     }
 

@@ -8,8 +8,8 @@ use crate::{Hit, Interval, Ray};
 impl<M> Scene<M> {
     /// The nearest hits of many rays: `hits[i]` becomes what [`intersect`](Self::intersect) answers to `rays[i]`.
     ///
-    /// Rays in a row that go much the same way, such as those of neighbouring pixels, are walked together; a picture of
-    /// meshes takes half the time. Others cost what they cost alone.
+    /// Rays in a row that go much the same way, such as those of neighbouring pixels, are taken through the scene and its meshes
+    /// together. Others are answered one by one.
     ///
     /// ```
     /// use truehit::{Camera, Interval, Scene, Sphere};
@@ -70,7 +70,7 @@ impl<M> Scene<M> {
         let bundle = bundle.get_or_insert_with(|| Bundle::EMPTY);
         let mut nearest = Nearest { scene: self, rays, open: *rays, hits: [None; RAYS] };
         for &object in &self.unbounded {
-            nearest.consider(object, u32::MAX, |_, _| {});
+            nearest.consider(object, all(many), |_, _| {});
         }
         let open = nearest.open;
         let taken = self.tree.together(&open, many, Start::Origin, bundle, |object, which, bundle| {
@@ -97,7 +97,6 @@ impl<M> Scene<M> {
         let bundle = bundle.get_or_insert_with(|| Bundle::EMPTY);
         let mut met = 0;
         let mut ask = |object: u32, which: u32, bundle: &mut Bundle| {
-            let which = which & !met;
             let now = self.occluded_by(object as usize, rays, which);
             met |= now;
             bundle.asking &= !now;
@@ -106,7 +105,7 @@ impl<M> Scene<M> {
             || alike && self.tree.together(rays, many, Start::Origin, bundle, &mut ask);
         if taken {
             for &object in &self.unbounded {
-                met |= self.occluded_by(object, rays, !met);
+                met |= self.occluded_by(object, rays, all(many) & !met);
             }
             *hits = std::array::from_fn(|ray| met >> ray & 1 == 1);
         }
@@ -140,7 +139,9 @@ impl<M> Nearest<'_, M> {
         self.scene.objects[object].shape.intersect_each(&asked[..count], &mut found[..count]);
         for (ray, hit) in bits(which).zip(found) {
             let Some(hit) = hit else { continue };
-            let (found, (ref line, within)) = (SceneHit { object, hit }, self.rays[ray]);
+            let (ref line, within) = self.rays[ray];
+            let hit = self.scene.unlimited(object, line, within, self.open[ray].1.max, hit);
+            let found = SceneHit { object, hit };
             if self.hits[ray].as_ref().is_none_or(|best| self.scene.precedes(line, &found, best)) {
                 self.hits[ray] = Some(found);
                 self.open[ray].1.max = reach(&hit, within.max);
@@ -148,6 +149,11 @@ impl<M> Nearest<'_, M> {
             }
         }
     }
+}
+
+/// The first `many` rays.
+fn all(many: usize) -> u32 {
+    u32::MAX >> (RAYS - many)
 }
 
 /// The numbers of the bits that are set.

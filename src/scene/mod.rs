@@ -175,13 +175,33 @@ impl<M> Scene<M> {
 
     /// Asks `object` for a hit and keeps it in `nearest` if it comes first.
     fn consider(&self, ray: &Ray, within: Interval, object: usize, nearest: &mut Option<SceneHit>) {
-        let within = Interval { max: nearest.as_ref().map_or(within.max, |n| reach(&n.hit, within.max)), ..within };
-        if let Some(hit) = self.objects[object].shape.intersect(ray, within) {
-            let found = SceneHit { object, hit };
+        let limit = nearest.as_ref().map_or(within.max, |n| reach(&n.hit, within.max));
+        if let Some(hit) = self.objects[object].shape.intersect(ray, Interval { max: limit, ..within }) {
+            let found = SceneHit { object, hit: self.unlimited(object, ray, within, limit, hit) };
             if nearest.as_ref().is_none_or(|best| self.precedes(ray, &found, best)) {
                 *nearest = Some(found);
             }
         }
+    }
+
+    /// What `object` answers within the whole of `within`, where `hit` was found before `limit`. Next to a limit kernels look
+    /// closer, and λ, `error` or `uv` may then differ within their bounds: an answer is not to depend on what was met before.
+    #[inline]
+    fn unlimited(&self, object: usize, ray: &Ray, within: Interval, limit: f64, hit: Hit) -> Hit {
+        /// Where a limit is next to a hit: within a few bounds, or this part of λ, which is far more than kernels need.
+        const NEXT: f64 = 1.0 / (1u64 << 40) as f64;
+        // Written so that an unknown bound is next to it.
+        let apart = hit.lambda + (8.0 * hit.error + NEXT * hit.lambda.abs()) < limit;
+        if apart || limit == within.max {
+            return hit;
+        }
+        self.asked_again(object, ray, within).unwrap_or(hit)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn asked_again(&self, object: usize, ray: &Ray, within: Interval) -> Option<Hit> {
+        self.objects[object].shape.intersect(ray, within)
     }
 
     /// Whether `a` comes before `b` on the ray.

@@ -191,6 +191,8 @@ impl<'a> Whitted<'a> {
     /// E seen along each of `camera_rays`, in linear RGB. All of them are followed bounce by bounce together, since rays of
     /// neighbouring pixels, and their shadow rays to one light, are found much faster so; each answer is the ray's own.
     ///
+    /// They are all held in memory: give it some hundreds at a time.
+    ///
     /// The recursion E = local + r_g·E' has one branch, so it is a loop.
     #[must_use]
     pub fn radiances(&self, camera_rays: impl IntoIterator<Item = Ray>, rays: &mut RayCount) -> Vec<Rgb> {

@@ -4,7 +4,9 @@
 //! one filter; λ is the plane's quotient with a normal in double-double, its bound proved beforehand. Where the filter is
 //! silent the signs are found in double-double, in integers or by [`Dyadic`]s. docs/numerics.md §4.
 
-use crate::kernel::bound::{TRIANGLE_CLOSE, TRIANGLE_CONDITION, TRIANGLE_LAMBDA, TRIANGLE_SIDES, U, UNDERFLOW};
+use crate::kernel::bound::{
+    LARGEST, TRIANGLE_CLOSE, TRIANGLE_CONDITION, TRIANGLE_LAMBDA, TRIANGLE_SIDES, U, UNDERFLOW, VANISHED,
+};
 use crate::kernel::bounded::Bounded;
 use crate::kernel::cpu;
 use crate::kernel::dyadic::Dyadic;
@@ -232,10 +234,6 @@ impl Sizes {
     }
 }
 
-/// Coordinates' differences and directions stay below this, together.
-const LARGEST: f64 = power(250);
-/// Triple products of such numbers lose less than 2⁻⁸²⁰ by underflow: nothing if they are above this.
-const VANISHED: f64 = power(-640);
 /// Between this and its inverse quotients have no range to mind either.
 const PRESENT: f64 = power(-450);
 /// How far off the weights may be that the fast path gives.

@@ -1,7 +1,7 @@
 //! What is asked of a triangle where it was hit: its normal, the point, and whether a ray has left it.
 
 use super::{Forms, intersect, weights};
-use crate::kernel::bound::U;
+use crate::kernel::bound::{TRIANGLE_THICK, U};
 use crate::kernel::bounded::Bounded;
 use crate::kernel::cpu;
 use crate::kernel::dyadic::Dyadic;
@@ -22,7 +22,7 @@ pub fn normal(vertices: &[DVec3; 3]) -> DVec3 {
     ordinary.unwrap_or_else(|| any_normal(vertices))
 }
 
-/// In double-double, without range. Off by 28u²M in each component: where the largest is above [`THICK`]·M by no more than
+/// In double-double, without range. Off by 28u²M in each component: where the largest is above [`TRIANGLE_THICK`]·M by no more than
 /// u of that.
 #[inline(always)]
 fn ordinary_normal<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, vertices: &[DVec3; 3]) -> Option<DVec3> {
@@ -30,12 +30,9 @@ fn ordinary_normal<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, vertices: &[DVec3;
     let [x, y, z, _] = (n.hi + n.lo).to_array();
     let n = DVec3::new(x, y, z);
     let longest = n.abs().max_element();
-    let known = (longest > THICK * size) & (longest > power(-400)) & (longest < power(400));
+    let known = (longest > TRIANGLE_THICK * size) & (longest > power(-400)) & (longest < power(400));
     known.then(|| n / n.length())
 }
-
-/// Twice what is needed.
-const THICK: f64 = 64.0 * U;
 
 #[cold]
 #[inline(never)]
@@ -78,7 +75,8 @@ pub fn side(vertices: &[DVec3; 3], point: DVec3) -> Ordering {
 #[must_use]
 pub fn departs(ray: &Ray, vertices: &[DVec3; 3], outward: bool) -> bool {
     leaving::triangle(ray, vertices, outward).unwrap_or_else(|| {
-        let beyond = if outward { Ordering::Greater } else { Ordering::Less };
-        ray.is_valid() && side(vertices, ray.origin) == beyond && intersect(ray, vertices, Interval::FORWARD).is_none()
+        ray.is_valid()
+            && side(vertices, ray.origin) == leaving::side(outward)
+            && intersect(ray, vertices, Interval::FORWARD).is_none()
     })
 }

@@ -305,8 +305,11 @@ impl Walk<'_, Nearests<'_>> {
                 self.confirm(simd, Spot::of(spot[ray / 16][ray % 16]), ray);
             }
         }
-        let remembered =
-            Remembered { which: remembered & !settled, spots: spot.as_flattened(), ids: id.as_flattened() };
+        let remembered = Remembered {
+            which: remembered & !settled & self.bundle.asking,
+            spots: spot.as_flattened(),
+            ids: id.as_flattened(),
+        };
         settle(simd, self.mesh, self.rays, &self.margins, remembered, self.answers.hits);
     }
 }
