@@ -59,7 +59,7 @@ pub trait Product: Copy + Debug {
 }
 
 /// By fused multiply-add: two instructions, but only inside code compiled for a CPU that has it
-/// ([`dispatch`](super::cpu::dispatch)); elsewhere it is a library call.
+/// ([`dispatch`]); elsewhere it is a library call.
 #[derive(Clone, Copy, Debug)]
 pub struct Fused;
 
