@@ -1,5 +1,5 @@
-//! Kernels beside the textbook's: shipped (exact decision, λ to the last bit or nearly, proved bound) and textbook f64, on
-//! the same rays, half of which hit. `cargo bench --bench kernels`
+//! Kernels beside the textbook's: shipped (exact decision, λ to the last bit or nearly, proved bound) and textbook f64,
+//! on the same rays, half of which hit. `cargo bench --bench kernels`
 
 #[path = "../tests/support/rng.rs"]
 mod rng;

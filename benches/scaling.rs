@@ -1,6 +1,6 @@
 //! How cost grows: meshes of 10⁴ to 10⁷ triangles, scenes of 10³ to 10⁶ instances. Prints tables, no statistics:
-//! `cargo bench --bench scaling [-- LARGEST]`, the largest number of triangles, 10⁶ unless told; a tenth of it of instances.
-//! `-- instances LARGEST` for the largest number of instances, and no meshes.
+//! `cargo bench --bench scaling [-- LARGEST]`, the largest number of triangles, 10⁶ unless told; a tenth of it of
+//! instances. `-- instances LARGEST` for the largest number of instances, and no meshes.
 
 #[path = "../tests/meshes/mod.rs"]
 mod meshes;

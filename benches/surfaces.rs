@@ -1,5 +1,5 @@
-//! What comes after a hit: the surface there (its point and normal), and a ray that leaves it. Each row asks both of the
-//! same hits; that all spawned rays leave is asserted. `cargo bench --bench surfaces`
+//! What comes after a hit: the surface there (its point and normal), and a ray that leaves it. Each row asks both of
+//! the same hits; that all spawned rays leave is asserted. `cargo bench --bench surfaces`
 
 #[path = "../tests/support/rng.rs"]
 mod rng;

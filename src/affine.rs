@@ -15,14 +15,15 @@ use glam::{DAffine3, DVec2, DVec3};
 /// `Arc<Mesh>` under many maps is instancing. λ is the same in both frames: directions are never normalised. A chain of
 /// maps is multiplied when it is made and costs what one map does.
 ///
-/// The shape is *defined* by [`object_from_world`](Self::object_from_world), the inverse map rounded to floats: a point x
-/// belongs to it if `object_from_world` · x belongs to the inner shape. Normals are Mᵀn normalised,
-/// M = `object_from_world`: outward stays outward under mirrors too.
+/// The shape is *defined* by [`object_from_world`](Self::object_from_world), the inverse map rounded to floats: a point
+/// x belongs to it if `object_from_world` · x belongs to the inner shape. Normals are Mᵀn normalised, M =
+/// `object_from_world`: outward stays outward under mirrors too.
 ///
 /// **What is decided.** A ray's exact image need not have float components. Hit or miss is decided, exactly, for
-/// [`object_ray`](Self::object_ray): that image with each component rounded once. Where the ray meets the surface within
-/// a unit in the last place of an edge or of a tangent, the exact image may decide otherwise, and nowhere else. λ is
-/// corrected for the rounding, `error` bounds what is left of it, and it is this λ that is compared with the interval.
+/// [`object_ray`](Self::object_ray): that image with each component rounded once. Where the ray meets the surface
+/// within a unit in the last place of an edge or of a tangent, the exact image may decide otherwise, and nowhere else.
+/// λ is corrected for the rounding, `error` bounds what is left of it, and it is this λ that is compared with the
+/// interval.
 ///
 /// ```
 /// use truehit::glam::{DAffine3, DVec3};
@@ -48,8 +49,8 @@ impl<S: Shape> Affine<S> {
     ///
     /// # Errors
     /// [`InvalidShape::NotFinite`] for a NaN or an infinity; [`InvalidShape::Singular`] if the map flattens space: its
-    /// exact determinant is zero, or that of its rounded inverse; [`InvalidShape::OutOfRange`] if the inverse leaves the
-    /// range of floats, or a chain's product does.
+    /// exact determinant is zero, or that of its rounded inverse; [`InvalidShape::OutOfRange`] if the inverse leaves
+    /// the range of floats, or a chain's product does.
     pub fn new(shape: S, world_from_object: DAffine3) -> Result<Self, InvalidShape> {
         if !world_from_object.is_finite() {
             return Err(InvalidShape::NotFinite { field: FIELD });
@@ -71,9 +72,9 @@ impl<S: Shape> Affine<S> {
     /// The ray that hit or miss is decided for, in the frame of the innermost shape: that of [`shape`](Self::shape), or
     /// if that is itself an `Affine`, of the shape inside it, and so on.
     ///
-    /// Each component x is off the exact image's by at most u·|x| + 48u²·P with u = 2⁻⁵³ and P the sum of absolute values
-    /// of the products that x is made of: half a unit in the last place, unless the maps all but cancel it. In a chain, each
-    /// further map may add 8u² of the product's largest entry to an entry.
+    /// Each component x is off the exact image's by at most u·|x| + 48u²·P with u = 2⁻⁵³ and P the sum of absolute
+    /// values of the products that x is made of: half a unit in the last place, unless the maps all but cancel it. In a
+    /// chain, each further map may add 8u² of the product's largest entry to an entry.
     #[must_use]
     pub fn object_ray(&self, world_ray: &Ray) -> Ray {
         self.image(world_ray).ray
@@ -109,8 +110,9 @@ fn refused(why: Unusable) -> InvalidShape {
     }
 }
 
-/// λ of the exact image is at most this many times further from that of the rounded one than the point moves, in lengths
-/// of the direction, unless the ray grazes by less than its inverse: how far outside the interval hits are looked for.
+/// λ of the exact image is at most this many times further from that of the rounded one than the point moves, in
+/// lengths of the direction, unless the ray grazes by less than its inverse: how far outside the interval hits are
+/// looked for.
 const REACH: f64 = power(20);
 
 impl<S: Shape> Affine<S> {
@@ -133,7 +135,8 @@ impl<S: Shape> Affine<S> {
         self.innermost_from_world.leading().matrix3.transpose() * object_normal
     }
 
-    /// κ‖M‖²/|Mᵀn|, in an order that stays in range: how far a surface of curvature κ is bent here, where |Mᵀn| is `shrunk`.
+    /// κ‖M‖²/|Mᵀn|, in an order that stays in range: how far a surface of curvature κ is bent here, where |Mᵀn| is
+    /// `shrunk`.
     fn curved(&self, curvature: f64, shrunk: f64) -> f64 {
         if curvature == 0.0 {
             return 0.0;
@@ -177,8 +180,8 @@ impl<S: Shape> Affine<S> {
 
     /// How far λ of `hit` moves from the rounded image to the exact one, and a bound on how far that is off.
     ///
-    /// With e = o_lo + λ·d_lo the first order is Δ = −n·e/n·d; what it leaves out is bounded by what is not known of e, n
-    /// and d, and by the surface's curvature. Where the ray grazes too closely for that, both hits lie in the shape's
+    /// With e = o_lo + λ·d_lo the first order is Δ = −n·e/n·d; what it leaves out is bounded by what is not known of e,
+    /// n and d, and by the surface's curvature. Where the ray grazes too closely for that, both hits lie in the shape's
     /// box. docs/numerics.md §8.
     fn shift(&self, image: &Image, hit: &Hit) -> (f64, f64) {
         let shape = self.innermost();
@@ -227,8 +230,8 @@ impl<S: Shape> Affine<S> {
         self.next_to_limit(image, hit, zone, within)
     }
 
-    /// Next to a limit: the first hit of which the corrected λ lies inside `within`, from the first one in `zone` on. Where
-    /// that is not known, the rounded image decides.
+    /// Next to a limit: the first hit of which the corrected λ lies inside `within`, from the first one in `zone` on.
+    /// Where that is not known, the rounded image decides.
     #[cold]
     #[inline(never)]
     fn next_to_limit(&self, image: &Image, mut hit: Hit, mut zone: Interval, within: Interval) -> Option<Hit> {
@@ -314,7 +317,8 @@ fn widened(image: &Image, within: Interval) -> Interval {
     let origin = taxicab(image.origin_low) + image.origin_error;
     let direction = taxicab(image.direction_low) + image.direction_error;
     let longest = image.ray.direction.abs().max_element();
-    // Infinite limits stay where they are; where the way to a finite one overflows, nothing is left out. 0·∞ adds nothing.
+    // Infinite limits stay where they are; where the way to a finite one overflows, nothing is left out. 0·∞ adds
+    // nothing.
     let reach = |limit: f64| (REACH * (origin + limit.abs() * direction) / longest).max(0.0);
     Interval { min: within.min - reach(within.min), max: within.max + reach(within.max) }
 }

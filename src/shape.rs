@@ -29,8 +29,9 @@ pub trait Shape: Debug + Send + Sync {
     /// A box that holds the whole shape; infinite for an unbounded one.
     fn bounds(&self) -> Aabb;
 
-    /// A box that holds the image of the whole shape under `map`, whose entries may each be off by half a unit in the last
-    /// place. The default is the image of [`bounds`](Self::bounds); a shape that knows its vertices has a tighter one.
+    /// A box that holds the image of the whole shape under `map`, whose entries may each be off by half a unit in the
+    /// last place. The default is the image of [`bounds`](Self::bounds); a shape that knows its vertices has a tighter
+    /// one.
     fn bounds_under(&self, map: &DAffine3) -> Aabb {
         self.bounds().image(map)
     }
@@ -40,8 +41,8 @@ pub trait Shape: Debug + Send + Sync {
         self.intersect(ray, within).is_some()
     }
 
-    /// The nearest hits of many rays: `hits[i]` becomes what [`intersect`](Self::intersect) answers to `rays[i]`. The default asks
-    /// one by one; a mesh walks rays that go the same way together.
+    /// The nearest hits of many rays: `hits[i]` becomes what [`intersect`](Self::intersect) answers to `rays[i]`. The
+    /// default asks one by one; a mesh walks rays that go the same way together.
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -52,8 +53,8 @@ pub trait Shape: Debug + Send + Sync {
         }
     }
 
-    /// Whether many rays hit anything: [`occludes`](Self::occludes) for each, as [`intersect_each`](Self::intersect_each) for
-    /// [`intersect`](Self::intersect).
+    /// Whether many rays hit anything: [`occludes`](Self::occludes) for each, as
+    /// [`intersect_each`](Self::intersect_each) for [`intersect`](Self::intersect).
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -95,26 +96,28 @@ pub trait Shape: Debug + Send + Sync {
         true
     }
 
-    /// The surface around `hit`, for who moves it a little: [`Affine`](crate::Affine) finds by it how far λ moves when a ray's
-    /// image is rounded. The default is a flat shape's, with a normal that is off by a few units in the last place.
+    /// The surface around `hit`, for who moves it a little: [`Affine`](crate::Affine) finds by it how far λ moves when
+    /// a ray's image is rounded. The default is a flat shape's, with a normal that is off by a few units in the last
+    /// place.
     fn tangent(&self, ray: &Ray, hit: &Hit) -> Tangent {
         Tangent { normal: self.normal(ray, hit), normal_error: 8.0 * f64::EPSILON, curvature: 0.0 }
     }
 
-    /// [`point`](Self::point) and [`tangent`](Self::tangent) at once, for which curved shapes and maps work out the same things.
+    /// [`point`](Self::point) and [`tangent`](Self::tangent) at once, for which curved shapes and maps work out the
+    /// same things.
     fn contact(&self, ray: &Ray, hit: &Hit) -> (SurfacePoint, Tangent) {
         (self.point(ray, hit), self.tangent(ray, hit))
     }
 
-    /// [`intersect`](Self::intersect) where only the piece of surface that `hit` lies on matters: hits of others may be answered
-    /// too, or not. The default looks at the whole shape; a mesh at one triangle.
+    /// [`intersect`](Self::intersect) where only the piece of surface that `hit` lies on matters: hits of others may be
+    /// answered too, or not. The default looks at the whole shape; a mesh at one triangle.
     fn intersect_piece(&self, ray: &Ray, hit: &Hit, within: Interval) -> Option<Hit> {
         let _ = hit;
         self.intersect(ray, within)
     }
 
-    /// The shape and the map, if this is another shape seen through an affine map (from the world to its frame): a chain of
-    /// [`Affine`](crate::Affine)s takes a ray to the innermost shape in one step. None by default.
+    /// The shape and the map, if this is another shape seen through an affine map (from the world to its frame): a
+    /// chain of [`Affine`](crate::Affine)s takes a ray to the innermost shape in one step. None by default.
     fn seen_through(&self) -> Option<(&dyn Shape, &Map)> {
         None
     }

@@ -65,8 +65,8 @@ impl<'a> Surface<'a> {
     }
 
     /// A ray that leaves the surface along `direction` (any non-zero length): it never meets the piece of surface it
-    /// starts on, on its way out. A direction with a negative component along the normal leaves inward (a refracted ray:
-    /// it meets a solid's far side as it should), any other outward.
+    /// starts on, on its way out. A direction with a negative component along the normal leaves inward (a refracted
+    /// ray: it meets a solid's far side as it should), any other outward.
     ///
     /// The origin is [`point`](Self::point) moved off the surface by its own error bound, and further only if the
     /// shape's exact test says that it is not yet clear: a few units in the last place, no epsilon.
@@ -76,7 +76,8 @@ impl<'a> Surface<'a> {
     }
 
     /// A ray from the surface to `target`, which it reaches at λ = 1: a shadow ray, to be traced over
-    /// `Interval::new(0.0, 1.0)`. To a target as near to the surface's plane as rounding is, the ray may meet that surface again.
+    /// `Interval::new(0.0, 1.0)`. To a target as near to the surface's plane as rounding is, the ray may meet that
+    /// surface again.
     #[must_use]
     pub fn spawn_to(&self, target: DVec3) -> Ray {
         self.leave(target - self.point, |origin| target - origin)

@@ -16,8 +16,8 @@ fn family(number: u32) -> Family {
     families::all().into_iter().find(|f| f.kernel == Kernel::Affine && f.number == number).unwrap()
 }
 
-/// Hit or miss is what exact arithmetic says of the rounded image; where that is not what it says of the exact image, both
-/// are within the documented rounding of each other (`object_ray` panics otherwise).
+/// Hit or miss is what exact arithmetic says of the rounded image; where that is not what it says of the exact image,
+/// both are within the documented rounding of each other (`object_ray` panics otherwise).
 #[test]
 fn decisions_are_exact_for_the_object_ray() {
     for number in [0, 1, 66, 67, 68, 70, 71, 72, 73, 85] {
@@ -77,8 +77,8 @@ fn limits_are_compared_with_the_exact_images_lambda() {
     assert!(hits > 1200 && flipped > 120);
 }
 
-/// Kept: two rays that start on the surface of which the rounded image alone would have answered with the other end, and
-/// one that hardly leaves it: λ = 1.3e-12 where the rounded image's is 2.6e-12.
+/// Kept: two rays that start on the surface of which the rounded image alone would have answered with the other end,
+/// and one that hardly leaves it: λ = 1.3e-12 where the rounded image's is 2.6e-12.
 const STARTS_ON_THE_SURFACE: [&str; 3] = [
     "origin [-0x1.26900d4be46b6p0, 0x1.ce2d2e3803606p1, 0x1.209ec15603da0p0] direction [-0x1.ad203d5bdf893p-6, -0x1.7eb21123d6258p-7, -0x1.83d0128a22f30p-3] within (0.0, inf) affine [-0x1.37294b56d4900p-2, 0x1.4ef93fd68592ap0, -0x1.b4fc8b7722864p0] [0x1.e222d45eaccfcp-3, 0x1.070326fd69f0cp-1, 0x1.4dd3f6e083e0ap-3] [0x1.025ead62675b7p-2, -0x1.22f5efd2a3c02p0, -0x1.7c800179160e7p-2] [-0x1.7fc5b466ecf96p-1, 0x1.8c55e41128e3cp-1, -0x1.decbf3925f2b4p0] sphere [-0x1.3a435d64f6712p1, 0x1.07167dc7568f2p1, -0x1.4d2829f592a20p1] 0x1.18a31adcf8575p1",
     "origin [-0x1.4f5dcf7340808p-2, -0x1.cf1083f8719bep-1, -0x1.5775e34db830ap1] direction [-0x1.fdf89538c3917p2, -0x1.3de06ecfa15e6p2, 0x1.1602bf8158644p-1] within (0.0, inf) affine [0x1.5385ba2e5177dp0, 0x1.3b8134c1d04d3p-1, 0x1.688b94d1c62e8p-2] [0x1.1099aac4fde80p-8, -0x1.5d4640d71654ep-1, 0x1.bddfbd3d981cdp-3] [0x1.af8871e0308d3p-2, -0x1.04a99d01cdef0p-1, -0x1.e1a0ba00ace51p-2] [0x1.ef58e58161960p0, 0x1.cf64bec4682f4p-1, 0x1.289e2482fae40p0] sphere [-0x1.7d8b290189ab8p1, -0x1.9ce7e1ae03102p1, 0x1.0c0d15a469870p2] 0x1.9a1a2aa534046p-3",
@@ -105,8 +105,8 @@ fn counter_examples_stay_right() {
     }
 }
 
-/// λ of a ray whose direction is 2ᵉ as long is 2⁻ᵉ as large, however short that is: how far beside the interval hits are
-/// looked for does not overflow.
+/// λ of a ray whose direction is 2ᵉ as long is 2⁻ᵉ as large, however short that is: how far beside the interval hits
+/// are looked for does not overflow.
 #[test]
 fn the_shortest_directions_lose_nothing() {
     let mut rng = Rng::new(73);

@@ -246,8 +246,8 @@ fn rays_and_intervals_that_hold_nothing_miss() {
         }
     }
     println!("{tried} rays and intervals");
-    // Of each specimen, in two intervals: not finite in each component of origin and direction, no direction, nothing at
-    // all; and eight empty intervals.
+    // Of each specimen, in two intervals: not finite in each component of origin and direction, no direction, nothing
+    // at all; and eight empty intervals.
     assert_eq!(tried, specimens.len() * (2 * (6 * NOT_FINITE.len() + 2 + 1) + 8));
 }
 

@@ -217,5 +217,6 @@ fn all_that_are_met_are_visited_once_however_many_wait() {
             }));
             assert!(visits.iter().all(|&v| v == 2), "{name}");
         }
+        println!("{name}: {n} of {n} boxes visited once by each query, from both ends");
     }
 }

@@ -133,8 +133,8 @@ macro_rules! contracts {
             check(Kernel::$kernel, 50_000, 50_000);
         }
 
-        /// `cargo test --release --test exact -- --ignored --nocapture --test-threads 1`: 1e7 cases a kernel, half hard;
-        /// other numbers by the environment variable `TRUEHIT_CASES`.
+        /// `cargo test --release --test exact -- --ignored --nocapture --test-threads 1`: 1e7 cases a kernel, half
+        /// hard; other numbers by the environment variable `TRUEHIT_CASES`.
         #[test]
         #[ignore = "minutes to an hour"]
         fn $long() {

@@ -136,7 +136,8 @@ fn tile(mesh: &Mesh, random: &mut Rng) -> Vec<(Ray, Interval)> {
         (eye, right, up)
     };
     let to_light = random.index(3) == 0;
-    // Lights in the plane of a triangle, at a vertex, and on the surface but for roundings; and rays that f32 has rounded.
+    // Lights in the plane of a triangle, at a vertex, and on the surface but for roundings; and rays that f32 has
+    // rounded.
     let eye = match random.index(8) {
         0 => corners[0] + 1.5 * (corners[1] - corners[0]) + 0.7 * (corners[2] - corners[0]),
         1 => corners[random.index(3)],
@@ -166,7 +167,8 @@ fn tile(mesh: &Mesh, random: &mut Rng) -> Vec<(Ray, Interval)> {
         .collect()
 }
 
-/// Asserts that a slice is answered as its rays are one by one, nearest and any hit, with every instruction set; how many hit.
+/// Asserts that a slice is answered as its rays are one by one, nearest and any hit, with every instruction set; how
+/// many hit.
 fn answered_alike(mesh: &mut Mesh, rays: &[(Ray, Interval)]) -> usize {
     let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
     for (level, simd) in Level::all() {
@@ -202,8 +204,8 @@ fn slices_are_answered_as_their_rays_are() {
     assert!(hits_in_all > rays_in_all / 2);
 }
 
-/// Rays that start, or end, next to one point of a surface, but for the spread that still counts as one place: what a leaf seen from there
-/// may be off by decides which side of it they start on.
+/// Rays that start, or end, next to one point of a surface, but for the spread that still counts as one place: what a
+/// leaf seen from there may be off by decides which side of it they start on.
 #[test]
 fn slices_from_a_surface_are_answered_as_their_rays_are() {
     let mut random = Rng::new(5);
@@ -238,7 +240,8 @@ fn slices_from_a_surface_are_answered_as_their_rays_are() {
     assert!(hits_in_all > rays_in_all / 4);
 }
 
-/// Rays to a light inside of what they start from, so that they come from all sides and from near and far, in runs of neighbours.
+/// Rays to a light inside of what they start from, so that they come from all sides and from near and far, in runs of
+/// neighbours.
 #[test]
 fn slices_to_a_light_in_the_middle_are_answered_as_their_rays_are() {
     let mut random = Rng::new(31);
@@ -269,7 +272,8 @@ fn slices_to_a_light_in_the_middle_are_answered_as_their_rays_are() {
     assert!(hits_in_all > rays_in_all / 10 && hits_in_all < rays_in_all * 9 / 10);
 }
 
-/// From a point inside of closed meshes to vertices, points of edges and of faces, and from behind these back to that point.
+/// From a point inside of closed meshes to vertices, points of edges and of faces, and from behind these back to that
+/// point.
 #[test]
 fn slices_do_not_leak() {
     let mut random = Rng::new(77);
@@ -574,8 +578,8 @@ fn closed_meshes_are_watertight() {
     watertight(1_080_000);
 }
 
-/// `cargo test --release --test mesh billion -- --ignored --nocapture`; other numbers of rays by the environment variable
-/// `TRUEHIT_CASES`.
+/// `cargo test --release --test mesh billion -- --ignored --nocapture`; other numbers of rays by the environment
+/// variable `TRUEHIT_CASES`.
 #[test]
 #[ignore = "a billion rays take half an hour"]
 fn a_billion_rays_do_not_leak() {
@@ -643,8 +647,8 @@ fn t_junctions_crack_only_where_they_really_do() {
     assert_eq!((met, cracked), (through, 0));
 }
 
-/// Where the middle was rounded away from the upper triangle, the input has a gap less than an ulp wide: rays through it
-/// miss, as they should, and no others do.
+/// Where the middle was rounded away from the upper triangle, the input has a gap less than an ulp wide: rays through
+/// it miss, as they should, and no others do.
 #[test]
 fn a_torn_t_junctions_gap_is_seen() {
     let mut random = Rng::new(8);

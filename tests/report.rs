@@ -181,7 +181,8 @@ fn errors_lie_in_their_bins() {
     assert_eq!(rows::histogram(&ulps), [2, 2, 2, 1, 1, 1, 2]);
 }
 
-/// Points off the surface, normals askew and rays that meet what they left show in a textbook kernel, not in the crate's.
+/// Points off the surface, normals askew and rays that meet what they left show in a textbook kernel, not in the
+/// crate's.
 #[test]
 fn points_normals_and_re_hits_show() {
     let sheet = sheet(Kernel::Sphere, 10);

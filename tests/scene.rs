@@ -147,8 +147,8 @@ fn scenes_cross_threads() {
     assert_send_sync::<Scene<u32>>();
 }
 
-/// A camera's rays in tiles and in rows, rays without order, rays to a light: what many rays are answered together is what each is
-/// answered alone.
+/// A camera's rays in tiles and in rows, rays without order, rays to a light: what many rays are answered together is
+/// what each is answered alone.
 #[test]
 fn slices_are_answered_like_their_rays() {
     let mut r = Rng::new(5);
@@ -198,7 +198,7 @@ fn slices_are_answered_like_their_rays() {
         let alone: Vec<_> = rays.iter().map(|(ray, within)| scene.intersect(ray, *within)).collect();
         let hits = alone.iter().flatten().count();
         println!("{name}: {hits} of {} rays hit", rays.len());
-        assert!(3 * hits > rays.len() || name == "to the lamp", "{name}");
+        assert!(5 * hits > rays.len(), "{name}");
         for length in [rays.len(), 100, 32, 9] {
             for (rays, alone) in rays.chunks(length).zip(alone.chunks(length)) {
                 let (mut together, mut dark) = (vec![None; rays.len()], vec![false; rays.len()]);
@@ -214,8 +214,9 @@ fn slices_are_answered_like_their_rays() {
     scene.intersect_each(&[], &mut []);
 }
 
-/// Slivers in the plane of a large triangle, seen at a slant: objects that all but tie, and kernels that look closer next to the limit
-/// that the others set. What is answered is what the object answers by itself, in whatever order they were met.
+/// Slivers in the plane of a large triangle, seen at a slant: objects that all but tie, and kernels that look closer
+/// next to the limit that the others set. What is answered is what the object answers by itself, in whatever order they
+/// were met.
 #[test]
 fn answers_do_not_depend_on_what_was_met_before() {
     let mut r = Rng::new(11);

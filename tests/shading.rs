@@ -295,7 +295,8 @@ fn terminator_factor_is_one_for_equal_normals_and_falls_to_zero() {
 
 #[test]
 fn srgb_is_the_piecewise_function() {
-    // IEC 61966-2-1: the linear piece, the join, mid grey, white. A power of 2.2 gives 0.0333 and 0.5 for 0.001, 0.2140.
+    // IEC 61966-2-1: the linear piece, the join, mid grey, white. A power of 2.2 gives 0.0333 and 0.5 for 0.001,
+    // 0.2140.
     for (linear, encoded) in
         [(0.0, 0.0), (0.001, 0.01292), (0.003_130_8, 0.040_449_936), (0.214_041_14, 0.5), (1.0, 1.0)]
     {

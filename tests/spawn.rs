@@ -257,8 +257,15 @@ fn a_target_at_the_origin_itself_is_left_for() {
     let down = Ray::new([1.0, 1.0, 0.0], [0.0, -1.0, 0.0]);
     let hit = floor.intersect(&down, Interval::FORWARD).unwrap();
     let surface = Surface::new(&floor, &down, &hit);
+    let mut steps = Vec::new();
     for k in 0..200 {
         let target = DVec3::new(1.0, f64::from(k) * 2f64.powi(-54), 0.0);
-        assert!(surface.spawn_to(target).is_valid(), "{k}");
+        let ray = surface.spawn_to(target);
+        assert!(ray.is_valid(), "{k}");
+        steps.push(ray.origin.y);
     }
+    let least = steps.iter().copied().fold(f64::INFINITY, f64::min);
+    let same = steps.iter().filter(|&&y| y == least).count();
+    println!("{} targets: {same} rays start {least:e} above the floor, the others farther up", steps.len());
+    assert!(same > 100 && same < steps.len());
 }

@@ -44,7 +44,8 @@ pub(crate) fn product(
     let table = Cone::truncated(foot - height * DVec3::Y, foot, 1.12 * reach, 1.1 * reach)?;
     let ground = Plane::new(foot - height * DVec3::Y, DVec3::Y)?;
 
-    // Far enough that every vertex and the table's front are inside the picture's pyramid, seen from in front of the middle.
+    // Far enough that every vertex and the table's front are inside the picture's pyramid, seen from in front of the
+    // middle.
     let [horizontal, vertical] = half_extent(FIELD_OF_VIEW, size);
     let rim = (0..32).map(|k| {
         let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / 32.0).sin_cos();

@@ -62,6 +62,7 @@ pub(crate) struct Sixteen {
     near_shift: [[f32; 16]; 3],
     far_shift: [[f32; 16]; 3],
     pub(crate) t_min: [f32; 16],
+    /// −∞ for a place that has no ray.
     pub(crate) t_max: [f32; 16],
     /// What lies between these is certainly inside the ray's interval.
     sure_min: [f32; 16],

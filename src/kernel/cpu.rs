@@ -54,8 +54,8 @@ pub fn dispatch_lanes<R>(fused: impl FnOnce(<FusedLanes as Lanes>::Cpu) -> R, po
     }
 }
 
-/// [`dispatch_lanes`] to one function of references, generic over the [`Product`](super::eft::Product) and given the proof:
-/// they are passed in registers, where a closure would be passed in memory.
+/// [`dispatch_lanes`] to one function of references, generic over the [`Product`](super::eft::Product) and given the
+/// proof: they are passed in registers, where a closure would be passed in memory.
 macro_rules! dispatch_function {
     ($function:ident($($argument:ident: $type:ty),*) -> $answer:ty) => {{
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]

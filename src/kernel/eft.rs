@@ -154,8 +154,8 @@ fn splits<S: Simd, V: SimdFloat<S, Element = f64>>(a: V) -> (V, V) {
 /// Products below this have low parts that are no floats.
 const SMALL: f64 = f64::from_bits((1023 - 900) << 52);
 
-/// o + λd, each component rounded once or nearly: off by (u + 3u²(|oᵢ| + |λdᵢ|)/|result|) of itself. Where λdᵢ is below 2⁻⁹⁰⁰, or λ or d
-/// reaches 2⁹⁰⁰, product and sum are each rounded.
+/// o + λd, each component rounded once or nearly: off by (u + 3u²(|oᵢ| + |λdᵢ|)/|result|) of itself. Where λdᵢ is below
+/// 2⁻⁹⁰⁰, or λ or d reaches 2⁹⁰⁰, product and sum are each rounded.
 #[must_use]
 pub fn step(o: DVec3, lambda: f64, d: DVec3) -> DVec3 {
     dispatch(

@@ -1,8 +1,9 @@
-//! The signs of triangles and of a sphere's tangents in 64-bit integers: exact, and faster than anything inexact that must look twice.
+//! The signs of triangles and of a sphere's tangents in 64-bit integers: exact, and faster than anything inexact that
+//! must look twice.
 //!
 //! Where a ray meets an edge or a vertex or touches a sphere *exactly*, the numbers are short: vertices on a grid, or
-//! single-precision vertices, seen along a tidy direction. All coordinates are then integers of one power of two, and the edge functions
-//! fit 192 bits.
+//! single-precision vertices, seen along a tidy direction. All coordinates are then integers of one power of two, and
+//! the edge functions fit 192 bits.
 
 use super::float::power;
 use crate::Ray;

@@ -28,7 +28,7 @@ pub(super) fn triangle(ray: &Ray, vertices: &[DVec3; 3], outward: bool) -> Optio
     cpu::dispatch_function!(of_triangle(ray: &Ray, vertices: &[DVec3; 3], outward: bool) -> Option<bool>)
 }
 
-/// Which side that is.
+/// The sign of an `outward` height over the surface.
 pub(super) fn side(outward: bool) -> Ordering {
     if outward { Ordering::Greater } else { Ordering::Less }
 }

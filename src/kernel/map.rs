@@ -49,8 +49,8 @@ impl From<DAffine3> for Map {
     }
 }
 
-/// The inverse, each entry rounded once: found exactly where that is needed, so that no determinant under- or overflows.
-/// `map` must be finite.
+/// The inverse, each entry rounded once: found exactly where that is needed, so that no determinant under- or
+/// overflows. `map` must be finite.
 ///
 /// # Errors
 /// If the exact determinant is zero, or an entry of the inverse overflows.
@@ -199,7 +199,8 @@ impl Map {
         if !leading.is_finite() {
             return Err(Unusable::OutOfRange);
         }
-        // Two floats hold a number to 2⁻¹⁰⁴ of itself, or to a few of the smallest; what this map did not know is multiplied.
+        // Two floats hold a number to 2⁻¹⁰⁴ of itself, or to a few of the smallest; what this map did not know is
+        // multiplied.
         let rounding = |largest: f64| 4.0 * U * U * largest + f64::from_bits(4);
         let largest = |m: &DMat3| m.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs()));
         let translation = leading.translation.abs().max_element();
@@ -256,8 +257,8 @@ impl Map {
         )
     }
 
-    /// Without closures, which are compiled without the instructions that `L` needs where they are not inlined; those of
-    /// [`cpu::dispatch_lanes`] always are.
+    /// Without closures, which are compiled without the instructions that `L` needs where they are not inlined; those
+    /// of [`cpu::dispatch_lanes`] always are.
     #[inline(always)]
     fn image_with<L: Lanes>(&self, cpu: L::Cpu, ray: &Ray) -> Image {
         let (o, d) = (ray.origin, ray.direction);
@@ -331,8 +332,8 @@ pub struct Image {
 }
 
 impl Image {
-    /// Whether these errors are too small to count: beside the last places, or, of the origin, beside λ's; or beside what is
-    /// unknown anyway. A NaN is not.
+    /// Whether these errors are too small to count: beside the last places, or, of the origin, beside λ's; or beside
+    /// what is unknown anyway. A NaN is not.
     #[inline(always)]
     fn knows(&self, direction_error: f64, origin_error: f64, unknown: [f64; 2], ray: &Ray) -> bool {
         let size = |v: DVec3| v.abs().max_element();
@@ -390,8 +391,8 @@ fn plain_product<L: Lanes>(m: [L; 3], v: DVec3, t: L) -> L {
     (m[0] * t.splat(v.x) + m[1] * t.splat(v.y)) + (m[2] * t.splat(v.z) + t)
 }
 
-/// M·v + t + `low` in double-double, and a bound on its error: each row's low part is a sum of seven terms in six additions,
-/// and `low` of four products or less, rounded seven times.
+/// M·v + t + `low` in double-double, and a bound on its error: each row's low part is a sum of seven terms in six
+/// additions, and `low` of four products or less, rounded seven times.
 #[inline(always)]
 fn product<L: Lanes>(m: [L; 3], v: DVec3, t: L, low: L) -> Sum {
     let (x, x_lo) = m[0].two_product(t.splat(v.x));
@@ -413,8 +414,8 @@ fn close_product<L: Lanes>(m: [L; 3], m_low: [L; 3], v: DVec3, t: L, t_low: L) -
     Sum::new(hi, lo, error)
 }
 
-/// (r + r_low)·v + t + `t_low` in double-double, summed in three floats, and a bound on its error, each lane for itself:
-/// docs/numerics.md §8.
+/// (r + r_low)·v + t + `t_low` in double-double, summed in three floats, and a bound on its error, each lane for
+/// itself: docs/numerics.md §8.
 #[inline(always)]
 fn close_sum<L: Lanes>(r: [L; 3], r_low: [L; 3], v: [L; 3], t: L, t_low: L) -> (L, L, L) {
     let (x, x_lo) = r[0].two_product(v[0]);

@@ -4,8 +4,8 @@ use super::bound::U;
 use super::float::{exponent_of, ldexp, power};
 use glam::{DMat3, DVec3};
 
-/// At least |Mv|/|v| for every v, exact but for rounding where M turns and scales along its own axes: ‖M‖² is at most the
-/// largest absolute row sum of MᵀM.
+/// At least |Mv|/|v| for every v, exact but for rounding where M turns and scales along its own axes: ‖M‖² is at most
+/// the largest absolute row sum of MᵀM.
 pub(crate) fn largest_stretch(m: &DMat3) -> f64 {
     let largest = m.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs()));
     if (power(-200)..power(200)).contains(&largest) {

@@ -1,8 +1,8 @@
 //! A planar polygon with holes: even-odd, decided exactly as the ray sees it.
 //!
-//! Every vertex is seen along the ray, as the two components X and Y of (v−o)×d, scaled; the ray itself is then the point
-//! (0, 0), and the crossings of the positive X axis are counted (Shimrat 1962) by the half-open rule on exact signs. No
-//! point is ever computed to be tested. docs/numerics.md §7.
+//! Every vertex is seen along the ray, as the two components X and Y of (v−o)×d, scaled; the ray itself is then the
+//! point (0, 0), and the crossings of the positive X axis are counted (Shimrat 1962) by the half-open rule on exact
+//! signs. No point is ever computed to be tested. docs/numerics.md §7.
 
 use super::bound::{LARGE, POLYGON_COORDINATE, U, UNDERFLOW};
 use super::bounded::Bounded;
@@ -33,8 +33,8 @@ pub struct Contours {
 }
 
 impl Contours {
-    /// The outer contour and the holes; `None` without three vertices in each, where a coordinate is not finite, or where
-    /// the outer contour's Newell normal is zero.
+    /// The outer contour and the holes; `None` without three vertices in each, where a coordinate is not finite, or
+    /// where the outer contour's Newell normal is zero.
     #[must_use]
     pub fn new(contours: &[&[DVec3]]) -> Option<Self> {
         let (outer, vertices) = (contours.first()?, contours.concat());
@@ -95,8 +95,8 @@ impl Contours {
         sign_of(|| dot(&self.bounded_normal(), &difference(x, from)), || dot(&self.exact_normal, &difference(x, from)))
     }
 
-    /// Whether `ray` starts strictly on the side of the plane that the normal points to, or for `outward` = false on the
-    /// other, and does not meet the polygon on its way: both exactly.
+    /// Whether `ray` starts strictly on the side of the plane that the normal points to, or for `outward` = false on
+    /// the other, and does not meet the polygon on its way: both exactly.
     #[must_use]
     pub fn departs(&self, ray: &Ray, outward: bool) -> bool {
         leaving::plane(ray, &self.vertices[0], &self.normal, outward).unwrap_or_else(|| {
@@ -216,8 +216,8 @@ fn surrounds(ray: &Ray, polygon: &Contours) -> Option<bool> {
     Some(inside)
 }
 
-/// A component of a vertex as the ray sees it, times d_z: where a line along the ray through it crosses the plane across the
-/// axis.
+/// A component of a vertex as the ray sees it, times d_z: where a line along the ray through it crosses the plane
+/// across the axis.
 #[inline(always)]
 fn seen(s: f64, sz: f64, d: f64, dz: f64) -> f64 {
     s * dz - sz * d

@@ -223,8 +223,8 @@ pub(super) fn fine(ray: &Ray, extent: f64) -> f64 {
 /// What [`precise`] promises: exact arithmetic and the few operations after it reach 2⁻⁹⁸.
 const PRECISE: f64 = f64::from_bits((1023 - 94) << 52); // 2⁻⁹⁴
 
-/// Of two ends the λ nearest to `lambda`, the first if it is within an ulp (next to an apex both may be), to a hundred bits;
-/// undecided where this arithmetic knows less.
+/// Of two ends the λ nearest to `lambda`, the first if it is within an ulp (next to an apex both may be), to a hundred
+/// bits; undecided where this arithmetic knows less.
 pub(super) fn precise<N: Number>(ends: &[End<N>; 2], lambda: f64) -> Result<[f64; 2], Undecided> {
     let (enter, exit) = (ends[0].lambda(), ends[1].lambda());
     // A NaN is not below it.

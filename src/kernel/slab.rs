@@ -1,4 +1,5 @@
-//! A closed box in f64, decided exactly: the interval of λ in which the line is inside all three slabs (Kay, Kajiya 1986).
+//! A closed box in f64, decided exactly: the interval of λ in which the line is inside all three slabs (Kay, Kajiya
+//! 1986).
 //!
 //! docs/numerics.md §9.
 
@@ -13,8 +14,8 @@ use std::cmp::Ordering;
 /// Where the line of `ray` enters and leaves the closed box from `min` to `max`, if some λ of that stretch lies inside
 /// `within`, or touches it from both sides.
 ///
-/// Flat boxes and single points are boxes; one with `min` above `max` on any axis, or with a NaN, holds nothing. Infinite
-/// limits are legal. The decision is exact; the two λ are within 4 ulp, infinite where the box is.
+/// Flat boxes and single points are boxes; one with `min` above `max` on any axis, or with a NaN, holds nothing.
+/// Infinite limits are legal. The decision is exact; the two λ are within 4 ulp, infinite where the box is.
 #[inline]
 #[must_use]
 pub fn intersect(ray: &Ray, min: DVec3, max: DVec3, within: Interval) -> Option<(f64, f64)> {

@@ -5,7 +5,8 @@
 
 use std::cell::Cell;
 
-/// What one thread has counted since it began. One ray may count several times: a mesh's, once a triangle that needs it.
+/// What one thread has counted since it began. One ray may count several times: a mesh's, once a triangle that needs
+/// it.
 ///
 /// ```
 /// use truehit::glam::DVec3;

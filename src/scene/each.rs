@@ -1,5 +1,5 @@
-//! What many rays meet first, and whether they meet anything: rays that go the same way are taken through the scene's tree
-//! together, and each object they reach is asked for all of them at once.
+//! What many rays meet first, and whether they meet anything: rays that go the same way are taken through the scene's
+//! tree together, and each object they reach is asked for all of them at once.
 
 use super::{Scene, SceneHit, reach};
 use crate::bvh::{self, Bundle, RAYS, Start, Stretch};
@@ -8,8 +8,8 @@ use crate::{Hit, Interval, Ray};
 impl<M> Scene<M> {
     /// The nearest hits of many rays: `hits[i]` becomes what [`intersect`](Self::intersect) answers to `rays[i]`.
     ///
-    /// Rays in a row that go much the same way, such as those of neighbouring pixels, are taken through the scene and its meshes
-    /// together. Others are answered one by one.
+    /// Rays in a row that go much the same way, such as those of neighbouring pixels, are taken through the scene and
+    /// its meshes together. Others are answered one by one.
     ///
     /// ```
     /// use truehit::{Camera, Interval, Scene, Sphere};
@@ -39,8 +39,9 @@ impl<M> Scene<M> {
         );
     }
 
-    /// Whether many rays hit anything: [`occludes`](Self::occludes) for each, as [`intersect_each`](Self::intersect_each) for
-    /// [`intersect`](Self::intersect). Shadow rays of neighbouring pixels to one light do best.
+    /// Whether many rays hit anything: [`occludes`](Self::occludes) for each, as
+    /// [`intersect_each`](Self::intersect_each) for [`intersect`](Self::intersect). Shadow rays of neighbouring pixels
+    /// to one light do best.
     ///
     /// # Panics
     /// If the slices differ in length.

@@ -184,8 +184,9 @@ impl<M> Scene<M> {
         }
     }
 
-    /// What `object` answers within the whole of `within`, where `hit` was found before `limit`. Next to a limit kernels look
-    /// closer, and λ, `error` or `uv` may then differ within their bounds: an answer is not to depend on what was met before.
+    /// What `object` answers within the whole of `within`, where `hit` was found before `limit`. Next to a limit
+    /// kernels look closer, and λ, `error` or `uv` may then differ within their bounds: an answer is not to depend on
+    /// what was met before.
     #[inline]
     fn unlimited(&self, object: usize, ray: &Ray, within: Interval, limit: f64, hit: Hit) -> Hit {
         /// Where a limit is next to a hit: within a few bounds, or this part of λ, which is far more than kernels need.

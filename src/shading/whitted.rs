@@ -188,8 +188,9 @@ impl<'a> Whitted<'a> {
         self.radiances(std::iter::once(*ray), rays)[0]
     }
 
-    /// E seen along each of `camera_rays`, in linear RGB. All of them are followed bounce by bounce together, since rays of
-    /// neighbouring pixels, and their shadow rays to one light, are found much faster so; each answer is the ray's own.
+    /// E seen along each of `camera_rays`, in linear RGB. All of them are followed bounce by bounce together, since
+    /// rays of neighbouring pixels, and their shadow rays to one light, are found much faster so; each answer is the
+    /// ray's own.
     ///
     /// They are all held in memory: give it some hundreds at a time.
     ///

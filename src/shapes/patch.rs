@@ -4,7 +4,8 @@ use glam::DVec3;
 
 /// A point s(α, β) of a curved surface with its tangents ∂s/∂α and ∂s/∂β, neither of unit length.
 ///
-/// Their cross product is the outward normal, as the gradient of the implicit form is; at a pole or an apex it vanishes.
+/// Their cross product is the outward normal, as the gradient of the implicit form is; at a pole or an apex it
+/// vanishes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Patch {
     /// s(α, β).

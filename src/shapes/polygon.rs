@@ -10,11 +10,11 @@ use glam::{DAffine3, DVec2, DVec3};
 /// A planar polygon, with holes if need be: concave or self-intersecting, even-odd.
 ///
 /// A point of its plane belongs to it if a line from it to infinity crosses the contours an odd number of times, all of
-/// them counted, or if it lies on a contour. So a hole may touch or leave the outer contour, the middle of a pentagram is
-/// outside, and repeated vertices and edges of no length do nothing. A ray in its plane misses.
+/// them counted, or if it lies on a contour. So a hole may touch or leave the outer contour, the middle of a pentagram
+/// is outside, and repeated vertices and edges of no length do nothing. A ray in its plane misses.
 ///
-/// The normal is the outer contour's (Newell 1972): seen from the side it points to, that contour runs anticlockwise. The
-/// plane goes through its first vertex.
+/// The normal is the outer contour's (Newell 1972): seen from the side it points to, that contour runs anticlockwise.
+/// The plane goes through its first vertex.
 ///
 /// Texture coordinates run from 0 to 1 over the polygon's extent along the two tangents that [`Plane`](crate::Plane)
 /// describes.
@@ -40,8 +40,8 @@ pub struct Polygon {
     extent: [DVec2; 2],
 }
 
-/// What rounding explains: a vertex may be off the plane by this times the largest coordinate. Vertices that were turned
-/// and moved into place are off by a few u each, and so are those that the plane was made of.
+/// What rounding explains: a vertex may be off the plane by this times the largest coordinate. Vertices that were
+/// turned and moved into place are off by a few u each, and so are those that the plane was made of.
 const ROUNDING: f64 = 16.0 * U;
 
 impl Polygon {

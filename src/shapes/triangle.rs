@@ -6,8 +6,8 @@ use glam::{DAffine3, DVec3};
 
 /// A triangle, edges and vertices included.
 ///
-/// Its normal is (b−a)×(c−a), by winding: seen from the side it points to, the vertices run anticlockwise. `uv` of a hit,
-/// and its texture coordinates, are the weights of `b` and `c`. A ray in its plane misses.
+/// Its normal is (b−a)×(c−a), by winding: seen from the side it points to, the vertices run anticlockwise. `uv` of a
+/// hit, and its texture coordinates, are the weights of `b` and `c`. A ray in its plane misses.
 ///
 /// ```
 /// use truehit::{Interval, Ray, Shape, Triangle};
@@ -27,8 +27,8 @@ impl Triangle {
     /// The triangle a, b, c; plain arrays are taken too.
     ///
     /// # Errors
-    /// [`InvalidShape::NotFinite`] for a NaN or an infinity, [`InvalidShape::Degenerate`] if the vertices lie on one line
-    /// exactly. However thin otherwise, it is a triangle.
+    /// [`InvalidShape::NotFinite`] for a NaN or an infinity, [`InvalidShape::Degenerate`] if the vertices lie on one
+    /// line exactly. However thin otherwise, it is a triangle.
     pub fn new(a: impl Into<DVec3>, b: impl Into<DVec3>, c: impl Into<DVec3>) -> Result<Self, InvalidShape> {
         let vertices = [a.into(), b.into(), c.into()];
         for (field, v) in ["a", "b", "c"].into_iter().zip(vertices) {

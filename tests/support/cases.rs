@@ -237,8 +237,8 @@ pub struct Family {
 }
 
 impl Family {
-    /// λ's contract in ulps: under a map the surface moves by the rounding of the ray's image, which a ray that grazes, or
-    /// that starts on the surface and hardly leaves it, turns into many of its own; the bound says so.
+    /// λ's contract in ulps: under a map the surface moves by the rounding of the ray's image, which a ray that grazes,
+    /// or that starts on the surface and hardly leaves it, turns into many of its own; the bound says so.
     pub fn contract(&self) -> f64 {
         let grazes = self.kernel == Kernel::Affine && matches!(self.number, 1 | 46);
         if grazes { f64::INFINITY } else { self.kernel.contract() }

@@ -306,8 +306,8 @@ pub fn slab(line: &Line, min: DVec3, max: DVec3) -> Option<[Real; 2]> {
     ends.filter(|[enter, exit]| compare(enter, exit).is_le())
 }
 
-/// The innermost solid of a chain of maps, and the exact image of the case's line in its frame, with P for each component
-/// of origin and direction: the sum of the absolute values that it is made of, as the maps multiply them.
+/// The innermost solid of a chain of maps, and the exact image of the case's line in its frame, with P for each
+/// component of origin and direction: the sum of the absolute values that it is made of, as the maps multiply them.
 pub fn innermost(case: &Case) -> (&Solid, Line, [DVec3; 2]) {
     let mut line = Line::from(&case.ray);
     let (mut o, mut d) = (case.ray.origin.abs(), case.ray.direction.abs());

@@ -1,5 +1,5 @@
-//! The exact answer, by brute force: a float filter that only rejects what certainly misses, and rationals for the rest.
-//! Shares no line with truehit.
+//! The exact answer, by brute force: a float filter that only rejects what certainly misses, and rationals for the
+//! rest. Shares no line with truehit.
 
 use crate::engine::{Found, Ray};
 use crate::mesh::Mesh;

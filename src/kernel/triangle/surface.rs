@@ -14,16 +14,16 @@ use crate::{Interval, Ray};
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
 
-/// The unit normal (b−a)×(c−a)/|…|, each component to a few ulps of the largest however thin the triangle; zero if it is
-/// degenerate. All vertices finite.
+/// The unit normal (b−a)×(c−a)/|…|, each component to a few ulps of the largest however thin the triangle; zero if it
+/// is degenerate. All vertices finite.
 #[must_use]
 pub fn normal(vertices: &[DVec3; 3]) -> DVec3 {
     let ordinary = cpu::dispatch_function!(ordinary_normal(vertices: &[DVec3; 3]) -> Option<DVec3>);
     ordinary.unwrap_or_else(|| any_normal(vertices))
 }
 
-/// In double-double, without range. Off by 28u²M in each component: where the largest is above [`TRIANGLE_THICK`]·M by no more than
-/// u of that.
+/// In double-double, without range. Off by 28u²M in each component: where the largest is above [`TRIANGLE_THICK`]·M by
+/// no more than u of that.
 #[inline(always)]
 fn ordinary_normal<P: Product>(cpu: <P::Lanes as Lanes>::Cpu, vertices: &[DVec3; 3]) -> Option<DVec3> {
     let (n, size) = leaving::normal::<P>(cpu, vertices);
@@ -46,8 +46,8 @@ fn normal_of<N: Number>(&[a, b, c]: &[DVec3; 3]) -> [N; 3] {
     cross(&difference(b, a), &difference(c, a))
 }
 
-/// The point a + u·(b−a) + v·(c−a), and a bound on its distance from the triangle's plane. The weights u, v ≥ 0 are those
-/// of a hit of `ray`; here they are found again, to the last bit or nearly.
+/// The point a + u·(b−a) + v·(c−a), and a bound on its distance from the triangle's plane. The weights u, v ≥ 0 are
+/// those of a hit of `ray`; here they are found again, to the last bit or nearly.
 #[must_use]
 pub fn point(ray: &Ray, vertices: &[DVec3; 3], uv: DVec2) -> (DVec3, f64) {
     let forms = Forms::of(ray, vertices);
@@ -70,8 +70,8 @@ pub fn side(vertices: &[DVec3; 3], point: DVec3) -> Ordering {
     number::sign_of(|| form(vertices, point), || form(vertices, point))
 }
 
-/// Whether `ray` starts strictly on the side of the triangle's plane that its normal points to, or for `outward` = false
-/// on the other, and does not meet the triangle on its way: both exactly.
+/// Whether `ray` starts strictly on the side of the triangle's plane that its normal points to, or for `outward` =
+/// false on the other, and does not meet the triangle on its way: both exactly.
 #[must_use]
 pub fn departs(ray: &Ray, vertices: &[DVec3; 3], outward: bool) -> bool {
     leaving::triangle(ray, vertices, outward).unwrap_or_else(|| {

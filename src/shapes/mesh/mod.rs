@@ -226,9 +226,9 @@ impl Shape for Mesh {
         query::any(self, ray, within)
     }
 
-    /// Rays in a row that go much the same way, such as those of neighbouring pixels, are walked through the tree together,
-    /// which is about three times as fast; most so if they start at one point, a camera, and come in tiles of pixels. Others
-    /// cost what they cost alone. Each answer is the ray's own, to the bit.
+    /// Rays in a row that go much the same way, such as those of neighbouring pixels, are walked through the tree
+    /// together, which is about three times as fast; most so if they start at one point, a camera, and come in tiles of
+    /// pixels. Others cost what they cost alone. Each answer is the ray's own, to the bit.
     fn intersect_each(&self, rays: &[(Ray, Interval)], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len(), "there must be one hit for each ray");
         each::closest(self, rays, hits);
