@@ -29,7 +29,7 @@ pub use level::Level;
 pub(crate) use bundle::{Bundle, RAYS, SIXTEENS, Sixteen, Start, Together, together};
 pub(crate) use collapse::build;
 pub(crate) use frame::{Frame, FrameBox};
-pub(crate) use slab::{E, Limits, LocalRay, Sure};
+pub(crate) use slab::{E, Ends, Limits, LocalRay, Sure};
 pub(crate) use slices::{Stretch, each, end_together, go_together};
 pub(crate) use tasks::map;
 pub(crate) use traverse::{Any, Closest, Lanes, any, closest};
@@ -146,7 +146,7 @@ impl Bvh {
         visit: &mut impl FnMut(u32, f64) -> f64,
     ) {
         let mut nearest = Nearest { bvh: self, local, bound, visit };
-        closest(simd, &self.tree, &Lanes::<S, FORWARD>::new(simd, local), local.t_max, &mut nearest);
+        closest(simd, &self.tree, &Lanes::<S, FORWARD>::new(simd, local), local.ends.t_max, &mut nearest);
     }
 
     /// Whether `hits(object)` for any object whose box the ray meets inside `within`; asks until the first yes.
@@ -181,7 +181,7 @@ impl Bvh {
         local: &LocalRay,
         hits: &mut impl FnMut(u32) -> bool,
     ) -> bool {
-        any(simd, &self.tree, &Lanes::<S, FORWARD>::new(simd, local), local.t_max, &mut First { bvh: self, hits })
+        any(simd, &self.tree, &Lanes::<S, FORWARD>::new(simd, local), local.ends.t_max, &mut First { bvh: self, hits })
     }
 
     /// Takes the rays of a bundle, the first `many` of which count, through the tree together: `visit(object, rays, bundle)` for every object whose box some of them

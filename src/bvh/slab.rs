@@ -7,7 +7,7 @@
 use super::frame::Frame;
 use crate::kernel::float::power;
 use crate::{Interval, Ray};
-use fearless_simd::{Simd, f32x4, f64x2, i32x4, prelude::*};
+use fearless_simd::{Simd, f32x4, f32x8, f64x2, i32x4, mask32x8, prelude::*};
 use glam::DVec3;
 
 /// A ray in the frame of a tree, with what the box and leaf tests need of it: `origin` + t·`direction`.
@@ -17,13 +17,10 @@ pub(crate) struct LocalRay {
     pub(crate) away: u32,
     /// 1/direction, within ±`Placed::steepest`.
     pub(crate) inv: [f32; 4],
+    /// What is taken from plane·inv: of planes met first, and of those met last.
     pub(crate) near_shift: [f32; 4],
     pub(crate) far_shift: [f32; 4],
-    /// Not above the t of `within.min`.
-    pub(crate) t_min: f32,
-    /// Not below the t of `within.max`.
-    pub(crate) t_max: f32,
-    pub(crate) sure: Sure,
+    pub(crate) ends: Ends,
     /// The origin, rounded.
     pub(crate) origin: [f32; 4],
     /// The direction, rounded.
@@ -110,23 +107,20 @@ impl LocalRay {
         Some(Self::placed(&placed, placed.limits.of(simd, within)))
     }
 
-    /// The ends of the interval as of [`Limits::of`].
     #[inline(always)]
-    fn placed<S: Simd>(placed: &Placed<S>, [t_min, sure_max, sure_min, t_max]: [f32; 4]) -> Self {
+    fn placed<S: Simd>(placed: &Placed<S>, ends: Ends) -> Self {
         let &Placed { origin, direction, size, length, error, steepest, limits } = placed;
         let simd = origin.simd;
         let splat = |x: f32| f32x4::splat(simd, x);
-        let inv = splat(1.0) / direction.abs().max(splat(1.0 / steepest)).copysign(direction);
-        let pad = origin.abs().mul_add(splat(SLAB), splat(SLAB + 2.0 * error));
-        let half = inv.abs() * pad;
+        let inv = splat(1.0) / largest_of(direction.abs(), splat(1.0 / steepest)).copysign(direction);
+        // Against the way the ray goes: what is met first is as if the origin lay farther on, what is met last as if farther back.
+        let pad = origin.abs().mul_add(splat(SLAB), splat(SLAB + 2.0 * error)).copysign(direction);
         Self {
             away: direction.bitcast::<i32x4<S>>().simd_lt(i32x4::splat(simd, 0)).to_bitmask() as u32,
             inv: inv.into(),
-            near_shift: (-origin.mul_add(inv, half)).into(),
-            far_shift: (-origin).mul_add(inv, half).into(),
-            t_min,
-            t_max,
-            sure: Sure { min: sure_min, max: sure_max },
+            near_shift: ((origin + pad) * inv).into(),
+            far_shift: ((origin - pad) * inv).into(),
+            ends,
             origin: origin.into(),
             direction: direction.into(),
             size,
@@ -153,27 +147,29 @@ impl Limits {
         ((t + slack) + t.abs() * NARROWING) as f32
     }
 
-    /// The least t of `within.min` and of `within.max`, and the greatest of both.
     #[inline(always)]
-    fn of<S: Simd>(&self, simd: S, within: Interval) -> [f32; 4] {
+    fn of<S: Simd>(&self, simd: S, within: Interval) -> Ends {
         let splat = |x: f64| f64x2::<S>::splat(simd, x);
         let t = f64x2::<S>::simd_from(simd, [within.min, within.max]) * self.stretch;
         let t = t.min(splat(FARTHEST_T)).max(splat(-FARTHEST_T));
         let slack = (t.abs() + splat(self.advance.abs())) * f64::EPSILON + TINY;
         let t = t - splat(self.advance);
         let half = t.abs() * NARROWING + slack;
-        (t - half).relaxed_narrow(t + half).into()
+        let [t_min, sure_max, sure_min, t_max]: [f32; 4] = (t - half).relaxed_narrow(t + half).into();
+        Ends { sure: Sure { min: sure_min, max: sure_max }, t_min, t_max }
     }
 }
 
 /// [`Limits::of`] for t = λ ≥ 0, in f32: rounded first, then moved by four roundings, to zero at least.
 #[inline(always)]
-fn plain_ends<S: Simd>(simd: S, within: Interval) -> [f32; 4] {
+fn plain_ends<S: Simd>(simd: S, within: Interval) -> Ends {
     let splat = |x: f32| f32x4::<S>::splat(simd, x);
     let ends = f64x2::<S>::simd_from(simd, [within.min, within.max]);
     let t = ends.relaxed_narrow(ends).min(splat(FARTHEST_T as f32));
     let half = t.mul_add(splat(4.0 * E), splat(TINY as f32));
-    half.mul_add(f32x4::simd_from(simd, [-1.0, -1.0, 1.0, 1.0]), t).max(splat(0.0)).into()
+    let ends = half.mul_add(f32x4::simd_from(simd, [1.0, -1.0, -1.0, 1.0]), t).max(splat(0.0));
+    let [min, max, t_min, t_max]: [f32; 4] = ends.into();
+    Ends { sure: Sure { min, max }, t_min, t_max }
 }
 
 /// Beyond this limits are all alike.
@@ -182,8 +178,20 @@ pub(super) const FARTHEST_T: f64 = power(100);
 /// Covers the rounding of a limit to f32, twice.
 const NARROWING: f64 = power(-23);
 
+/// An interval as limits of t, in the order in which they are found as one vector.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct Ends {
+    pub(crate) sure: Sure,
+    /// Not above the t of `within.min`.
+    pub(crate) t_min: f32,
+    /// Not below the t of `within.max`.
+    pub(crate) t_max: f32,
+}
+
 /// What is certainly inside an interval: limits of t rounded inward.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub(crate) struct Sure {
     min: f32,
     max: f32,
@@ -194,6 +202,12 @@ impl Sure {
     #[inline(always)]
     pub(crate) fn holds(self, [low, high]: [f32; 2]) -> bool {
         (low > self.min) & (high < self.max)
+    }
+
+    /// The same of eight.
+    #[inline(always)]
+    pub(crate) fn holds_each<S: Simd>(self, simd: S, [low, high]: [f32x8<S>; 2]) -> mask32x8<S> {
+        low.simd_gt(f32x8::splat(simd, self.min)) & high.simd_lt(f32x8::splat(simd, self.max))
     }
 }
 
@@ -206,20 +220,25 @@ fn as_it_is<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<Placed<S>> {
     let origin = ((pair(o.x, o.y) - pair(c.x, c.y)) * frame.scale)
         .relaxed_narrow((pair(o.z, 0.0) - pair(c.z, 0.0)) * frame.scale);
     let [size, length] = sizes(origin, direction);
-    let near = origin.abs().simd_le(NEAR) & direction.abs().simd_le(LENGTHS[1]);
     // A NaN fails every comparison.
-    if !((near.to_bitmask() == 0xf) & (length >= LENGTHS[0])) {
+    if !((size <= NEAR) & (length >= LENGTHS[0]) & (length <= LENGTHS[1])) {
         return None;
     }
     Some(Placed { origin, direction, size, length, error: PLAIN_ERROR, steepest: STEEPEST, limits: Limits::PLAIN })
 }
 
-/// The largest coordinates of two vectors whose fourth are zero, found beside each other; a NaN may be lost.
+/// The larger of each two that are not below zero, a NaN if there is one: compared as integers, in a quarter of the time.
+#[inline(always)]
+fn largest_of<S: Simd>(a: f32x4<S>, b: f32x4<S>) -> f32x4<S> {
+    a.bitcast::<i32x4<S>>().max(b.bitcast::<i32x4<S>>()).bitcast()
+}
+
+/// The largest coordinates of two vectors whose fourth are zero, found beside each other; a NaN if there is one.
 #[inline(always)]
 fn sizes<S: Simd>(a: f32x4<S>, b: f32x4<S>) -> [f32; 2] {
     let (a, b) = (a.abs(), b.abs());
-    let two = a.zip_low(b).max(a.zip_high(b));
-    let [of_a, of_b, ..]: [f32; 4] = two.max(two.slide::<2>(two)).into();
+    let two = largest_of(a.zip_low(b), a.zip_high(b));
+    let [of_a, of_b, ..]: [f32; 4] = largest_of(two, two.slide::<2>(two)).into();
     [of_a, of_b]
 }
 

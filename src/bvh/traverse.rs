@@ -13,8 +13,11 @@ use fearless_simd::{Simd, f32x8, i32x8, prelude::*};
 struct Stack<'a> {
     entries: &'a mut Entries,
     len: usize,
-    spilled: &'a mut Vec<i64>,
+    spilled: &'a mut Spilled,
 }
+
+/// Nothing, as a rule, which one word tells.
+type Spilled = Option<Box<Vec<i64>>>;
 
 /// Aligned, since it is cleared by vectors.
 #[repr(align(32))]
@@ -24,7 +27,7 @@ const ROOM: usize = 32;
 
 impl<'a> Stack<'a> {
     #[inline(always)]
-    fn new(entries: &'a mut Entries, spilled: &'a mut Vec<i64>) -> Self {
+    fn new(entries: &'a mut Entries, spilled: &'a mut Spilled) -> Self {
         Self { entries, len: 0, spilled }
     }
 
@@ -54,12 +57,6 @@ impl<'a> Stack<'a> {
         self.len += usize::from(really);
     }
 
-    /// The last entry.
-    #[inline(always)]
-    fn top(&mut self) -> &mut i64 {
-        self.slot(self.len - 1)
-    }
-
     /// Pushes below all of the last `count` that are nearer.
     #[inline(always)]
     fn insert(&mut self, entry: i64, count: usize) {
@@ -75,7 +72,7 @@ impl<'a> Stack<'a> {
     #[inline(always)]
     fn pop(&mut self) -> Option<i64> {
         if self.len == 0 {
-            return self.spilled.pop();
+            return self.spilled.as_mut()?.pop();
         }
         self.len -= 1;
         Some(*self.slot(self.len))
@@ -84,8 +81,8 @@ impl<'a> Stack<'a> {
 
 #[cold]
 #[inline(never)]
-fn spill(to: &mut Vec<i64>, entries: &[i64]) {
-    to.extend_from_slice(entries);
+fn spill(to: &mut Spilled, entries: &[i64]) {
+    to.get_or_insert_default().extend_from_slice(entries);
 }
 
 #[inline(always)]
@@ -109,10 +106,22 @@ impl Row {
     }
 }
 
+/// The first lane of these.
+#[inline(always)]
+fn lane_of(hits: u32) -> usize {
+    hits.trailing_zeros() as usize & 7
+}
+
 /// A child, and the t where its box begins.
 #[inline(always)]
 fn entry(child: u32, t: f32) -> i64 {
     (u64::from(t.to_bits()) << 32 | u64::from(child)) as i64
+}
+
+/// Whether a child's box begins by `t_max`. `FORWARD`: no t is below zero, so that they compare as integers do.
+#[inline(always)]
+fn begins_by<const FORWARD: bool>(t_max: f32, child: i64) -> bool {
+    if FORWARD { child <= entry(u32::MAX, t_max) } else { f32::from_bits((child >> 32) as u32) <= t_max }
 }
 
 #[inline(always)]
@@ -139,12 +148,12 @@ pub(crate) struct Lanes<S: Simd, const FORWARD: bool> {
 impl<S: Simd, const FORWARD: bool> Lanes<S, FORWARD> {
     #[inline(always)]
     pub(crate) fn new(simd: S, ray: &LocalRay) -> Self {
-        debug_assert!(!FORWARD || ray.t_min.is_sign_positive(), "the integers sort as the floats do");
+        debug_assert!(!FORWARD || ray.ends.t_min.is_sign_positive(), "the integers sort as the floats do");
         Self {
             inv: spread(simd, &ray.inv),
             near_shift: spread(simd, &ray.near_shift),
             far_shift: spread(simd, &ray.far_shift),
-            t_min: f32x8::splat(simd, ray.t_min),
+            t_min: f32x8::splat(simd, ray.ends.t_min),
             near: near_rows(ray.away).map(|row| 8 * row as usize),
             far: near_rows(ray.away).map(|row| 8 * (row ^ 1) as usize),
         }
@@ -157,12 +166,12 @@ impl<S: Simd, const FORWARD: bool> Lanes<S, FORWARD> {
         let (near_x, far_x) = (node.row_from(simd, self.near[0]), node.row_from(simd, self.far[0]));
         let (near_y, far_y) = (node.row_from(simd, self.near[1]), node.row_from(simd, self.far[1]));
         let (near_z, far_z) = (node.row_from(simd, self.near[2]), node.row_from(simd, self.far[2]));
-        let enter_x = near_x.mul_add(inv[0], near[0]);
-        let enter_y = near_y.mul_add(inv[1], near[1]);
-        let enter_z = near_z.mul_add(inv[2], near[2]);
-        let exit_x = far_x.mul_add(inv[0], far[0]);
-        let exit_y = far_y.mul_add(inv[1], far[1]);
-        let exit_z = far_z.mul_add(inv[2], far[2]);
+        let enter_x = near_x.mul_sub(inv[0], near[0]);
+        let enter_y = near_y.mul_sub(inv[1], near[1]);
+        let enter_z = near_z.mul_sub(inv[2], near[2]);
+        let exit_x = far_x.mul_sub(inv[0], far[0]);
+        let exit_y = far_y.mul_sub(inv[1], far[1]);
+        let exit_z = far_z.mul_sub(inv[2], far[2]);
         let t_max = f32x8::splat(simd, t_max);
         if FORWARD {
             // As integers, which AVX2 compares in a quarter of the time: of a box that matters every exit is above zero,
@@ -200,7 +209,7 @@ pub(crate) fn closest<S: Simd, const FORWARD: bool>(
     leaves: &mut impl Closest<S>,
 ) {
     let nodes = &tree.nodes[..];
-    let (mut entries, mut spilled) = (Entries([0; ROOM]), Vec::new());
+    let (mut entries, mut spilled) = (Entries([0; ROOM]), None);
     let mut stack = Stack::new(&mut entries, &mut spilled);
     let mut at = 0u32;
     loop {
@@ -208,48 +217,42 @@ pub(crate) fn closest<S: Simd, const FORWARD: bool>(
         while at & LEAF == 0 {
             let node = &nodes[at as usize];
             let (mut hits, enter) = ray.test(simd, node, t_max);
+            // Stored at once, since lanes are read as soon as it is known which.
+            let enter = Row::of(enter);
             if hits == 0 {
                 at = NONE;
                 break;
             }
             let child = Row::of(node.row(simd, CHILDREN as u32));
             let child = |lane: usize| child.lane(lane).to_bits();
-            let first = hits.trailing_zeros() as usize & 7;
+            let first = lane_of(hits);
             hits &= hits - 1;
             if hits == 0 {
                 at = child(first);
                 continue;
             }
             stack.reserve();
-            let enter = Row::of(enter);
-            let second = hits.trailing_zeros() as usize & 7;
+            let of = |hits: u32| entry(child(lane_of(hits)), enter.lane(lane_of(hits)));
+            let (a, b) = (entry(child(first), enter.lane(first)), of(hits));
             hits &= hits - 1;
-            let (a, b) = (entry(child(first), enter.lane(first)), entry(child(second), enter.lane(second)));
             let (nearer, farther) = in_order(a, b);
+            // Two or three without a branch on which, or on their order: nothing foretells it.
+            let third = of(hits);
+            let c = if hits == 0 { i64::MAX } else { third };
+            let (c, farthest) = in_order(c, farther);
+            let (nearest, farther) = in_order(nearer, c);
+            stack.push_if(farthest, hits != 0);
             stack.push(farther);
+            hits &= hits.wrapping_sub(1);
             if hits == 0 {
-                at = nearer as u32;
+                at = nearest as u32;
                 continue;
             }
-            // Three without branches on their order, which nothing foretells.
-            let third = hits.trailing_zeros() as usize & 7;
-            hits &= hits - 1;
-            let c = entry(child(third), enter.lane(third));
-            if hits == 0 {
-                let (c, farther) = in_order(c, farther);
-                let (nearer, c) = in_order(nearer, c);
-                *stack.top() = farther;
-                stack.push(c);
-                at = nearer as u32;
-                continue;
-            }
-            stack.push(nearer);
-            stack.insert(c, 2);
+            stack.push(nearest);
             let mut count = 3;
             while hits != 0 {
-                let i = hits.trailing_zeros() as usize & 7;
+                stack.insert(of(hits), count);
                 hits &= hits - 1;
-                stack.insert(entry(child(i), enter.lane(i)), count);
                 count += 1;
             }
             let Some(nearest) = stack.pop() else { return };
@@ -260,7 +263,7 @@ pub(crate) fn closest<S: Simd, const FORWARD: bool>(
         }
         loop {
             let Some(next) = stack.pop() else { return };
-            if f32::from_bits((next >> 32) as u32) <= t_max {
+            if begins_by::<FORWARD>(t_max, next) {
                 at = next as u32;
                 break;
             }
@@ -278,7 +281,7 @@ pub(crate) fn any<S: Simd, const FORWARD: bool>(
     leaves: &mut impl Any<S>,
 ) -> bool {
     let nodes = &tree.nodes[..];
-    let (mut entries, mut spilled) = (Entries([0; ROOM]), Vec::new());
+    let (mut entries, mut spilled) = (Entries([0; ROOM]), None);
     let mut stack = Stack::new(&mut entries, &mut spilled);
     let mut at = 0u32;
     loop {

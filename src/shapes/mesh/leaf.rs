@@ -5,7 +5,7 @@
 //! docs/numerics.md §10.
 
 use super::Mesh;
-use crate::bvh::{Bundle, E, LocalRay};
+use crate::bvh::{Bundle, E, LocalRay, Sure};
 use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
 use glam::DVec3;
 
@@ -109,7 +109,6 @@ pub(super) struct Probe {
     origin: [f32; 4],
     direction: [f32; 4],
     pub(super) margins: Margins,
-    pub(super) t_min: f32,
     /// No hit has a t above this in absolute value.
     reach: f32,
     /// Leaves hold vertices, not edges.
@@ -149,13 +148,11 @@ impl Probe {
     #[inline(always)]
     pub(super) fn new(ray: &LocalRay, exact: bool) -> Self {
         let steps = steps(ray.size, ray.origin_error);
-        let reach = steps / ray.length;
         Self {
             origin: ray.origin,
             direction: ray.direction,
             margins: Margins::new(steps, ray.length),
-            t_min: if ray.t_min > -reach { ray.t_min } else { -reach },
-            reach,
+            reach: steps / ray.length,
             exact,
         }
     }
@@ -166,13 +163,20 @@ impl Probe {
         if t_max < self.reach { t_max } else { self.reach }
     }
 
-    /// Which triangles of `leaf` may be met between `t_min` and `t_max`, and what is known of them; `None` if none.
+    /// The same of the earlier end, of a ray that may have one below zero.
     #[inline(always)]
-    pub(super) fn test<S: Simd>(&self, simd: S, leaf: &Leaf, t_max: f32) -> Option<Outcome> {
+    pub(super) fn first(&self, t_min: f32) -> f32 {
+        if t_min > -self.reach { t_min } else { -self.reach }
+    }
+
+    /// Which triangles of `leaf` may be met between `t_min`, as of [`first`](Self::first), and `t_max`, and what is known of them;
+    /// `None` if none.
+    #[inline(always)]
+    pub(super) fn test<S: Simd>(&self, simd: S, leaf: &Leaf, [t_min, t_max]: [f32; 2]) -> Option<OfEight<S>> {
         let triangles = leaf.triangles(simd, self.exact);
         let (o, d) = (spread(simd, &self.origin), spread(simd, &self.direction));
-        let (t_min, last) = (splat(simd, self.t_min), splat(simd, self.last(t_max)));
-        Some(filter(simd, &triangles, [o, d], &self.margins, [t_min, last])?.outcome())
+        let (t_min, last) = (splat(simd, t_min), splat(simd, self.last(t_max)));
+        filter(simd, &triangles, [o, d], &self.margins, [t_min, last])
     }
 }
 
@@ -314,6 +318,13 @@ pub(super) struct Verdict<V, M> {
 pub(super) type OfEight<S> = Verdict<f32x8<S>, mask32x8<S>>;
 
 impl<S: Simd> OfEight<S> {
+    /// The lanes whose triangles are hit inside `sure`, for certain.
+    #[inline(always)]
+    pub(super) fn certain(&self, simd: S, sure: Sure) -> u32 {
+        let certain = self.through & sure.holds_each(simd, [self.low, self.high]);
+        self.maybe & certain.to_bitmask() as u32
+    }
+
     /// The same, lane by lane.
     #[inline(always)]
     pub(super) fn outcome(&self) -> Outcome {

@@ -3,7 +3,7 @@
 use super::Mesh;
 use super::leaf::{Leaf, Outcome, Probe, Spot, UNCERTIFIED};
 use super::settle::settle_one;
-use crate::bvh::{self, Lanes, Limits, LocalRay, Sure};
+use crate::bvh::{self, Ends, Lanes, Limits, LocalRay};
 use crate::kernel::eft::{Fused, Split};
 use crate::kernel::{cpu, tally, textbook, triangle};
 use crate::{Hit, Interval, Ray};
@@ -16,9 +16,24 @@ use std::cmp::Ordering;
 /// By value down to where it is found: in memory of this function's it would be copied by loads that wait for all of its stores.
 #[inline(always)]
 pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
-    let asked = Asked::new(mesh, ray, within);
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    if let Level::Avx2(simd) = mesh.level.token() {
+        return closest_avx2(simd, mesh, ray, within);
+    }
+    closest_dispatched(mesh, ray, within)
+}
+
+// Arguments in registers: a closure would be given them in memory.
+fearless_simd::kernel!(
+    fn closest_avx2(simd: Avx2, mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
+        closest_with(simd, mesh, ray, within)
+    }
+);
+
+#[inline(never)]
+fn closest_dispatched(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
     dispatch!(mesh.level.token(), simd => {
-        if is_baseline(simd) { closest_apart(simd, &asked) } else { closest_with(simd, &asked) }
+        if is_baseline(simd) { closest_apart(simd, mesh, ray, within) } else { closest_with(simd, mesh, ray, within) }
     })
 }
 
@@ -27,7 +42,12 @@ pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
 pub(super) fn find_closest(mesh: &Mesh, ray: &Ray, within: Interval, hit: &mut Option<Hit>) {
     let asked = Asked::new(mesh, ray, within);
     dispatch!(mesh.level.token(), simd => {
-        *hit = if is_baseline(simd) { closest_apart(simd, &asked) } else { closest_with(simd, &asked) };
+        let within = asked.within();
+        *hit = if is_baseline(simd) {
+            closest_apart(simd, asked.mesh, asked.ray, within)
+        } else {
+            closest_with(simd, asked.mesh, asked.ray, within)
+        };
     });
 }
 
@@ -42,11 +62,11 @@ fn is_baseline<S: Simd>(simd: S) -> bool {
 }
 
 #[inline(never)]
-fn closest_apart<S: Simd>(simd: S, asked: &Asked) -> Option<Hit> {
-    closest_with(simd, asked)
+fn closest_apart<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
+    closest_with(simd, mesh, ray, within)
 }
 
-/// A query on its way into a dispatched function, which takes it through memory. The limits do not stand side by side: they would be stored
+/// A query on its way into a closure, which takes it through memory. The limits do not stand side by side: they would be stored
 /// one by one and loaded as a pair, which has to wait until both have reached the cache.
 #[repr(C)]
 struct Asked<'a> {
@@ -69,73 +89,105 @@ impl<'a> Asked<'a> {
 }
 
 #[inline(always)]
-fn closest_with<S: Simd>(simd: S, asked: &Asked) -> Option<Hit> {
-    match LocalRay::new(simd, asked.mesh.frame(), asked.ray, asked.within()) {
-        Some(local) => closest_along::<S, true>(simd, asked, &local),
-        None => closest_uncommon(simd, asked),
+fn closest_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
+    match LocalRay::new(simd, mesh.frame(), ray, within) {
+        Some(local) => closest_along::<S, true>(simd, mesh, ray, within, &local),
+        None => closest_uncommon(simd, mesh, ray, within),
     }
 }
 
 #[inline(never)]
-fn closest_uncommon<S: Simd>(simd: S, asked: &Asked) -> Option<Hit> {
+fn closest_uncommon<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
     simd.vectorize(
         #[inline(always)]
-        move || match LocalRay::uncommon(simd, asked.mesh.frame(), asked.ray, asked.within()) {
-            Some(local) => closest_along::<S, false>(simd, asked, &local),
-            None => closest_of_all(asked.mesh, asked.ray, asked.within()),
+        move || match LocalRay::uncommon(simd, mesh.frame(), ray, within) {
+            Some(local) => closest_along::<S, false>(simd, mesh, ray, within, &local),
+            None => closest_of_all(mesh, ray, within),
         },
     )
 }
 
 #[inline(always)]
-fn closest_along<S: Simd, const FORWARD: bool>(simd: S, asked: &Asked, local: &LocalRay) -> Option<Hit> {
-    let &Asked { ray, mesh, .. } = asked;
-    let mut walk = Single {
-        probe: Probe::new(local, mesh.exact),
-        nearest: Nearest::new(mesh, ray, asked.within(), local.limits, local.sure, local.t_max),
-    };
-    bvh::closest(simd, &mesh.tree, &Lanes::<S, FORWARD>::new(simd, local), local.t_max, &mut walk);
+fn closest_along<S: Simd, const FORWARD: bool>(
+    simd: S,
+    mesh: &Mesh,
+    ray: &Ray,
+    within: Interval,
+    local: &LocalRay,
+) -> Option<Hit> {
+    let (probe, ends) = probe_and_ends::<FORWARD>(mesh, local);
+    let nearest = Nearest::new(mesh, ray, within, local.limits, ends);
+    let mut walk = Single { leaves: &mesh.leaves, probe, nearest };
+    bvh::closest(simd, &mesh.tree, &Lanes::<S, FORWARD>::new(simd, local), ends.t_max, &mut walk);
     let probe = if FORWARD { Some(&walk.probe) } else { None };
     walk.nearest.settle(simd, probe)
 }
 
+/// What leaves are asked with, and where.
+#[inline(always)]
+fn probe_and_ends<const FORWARD: bool>(mesh: &Mesh, local: &LocalRay) -> (Probe, Ends) {
+    let (probe, ends) = (Probe::new(local, mesh.exact), local.ends);
+    (probe, if FORWARD { ends } else { Ends { t_min: probe.first(ends.t_min), ..ends } })
+}
+
 /// Whether anything is hit.
+#[inline(always)]
 pub(super) fn any(mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
-    let asked = Asked::new(mesh, ray, within);
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    if let Level::Avx2(simd) = mesh.level.token() {
+        return any_avx2(simd, mesh, ray, within);
+    }
+    any_dispatched(mesh, ray, within)
+}
+
+fearless_simd::kernel!(
+    fn any_avx2(simd: Avx2, mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
+        any_with(simd, mesh, ray, within)
+    }
+);
+
+#[inline(never)]
+fn any_dispatched(mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
     dispatch!(mesh.level.token(), simd => {
-        if is_baseline(simd) { any_apart(simd, &asked) } else { any_with(simd, &asked) }
+        if is_baseline(simd) { any_apart(simd, mesh, ray, within) } else { any_with(simd, mesh, ray, within) }
     })
 }
 
 #[inline(never)]
-fn any_apart<S: Simd>(simd: S, asked: &Asked) -> bool {
-    any_with(simd, asked)
+fn any_apart<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
+    any_with(simd, mesh, ray, within)
 }
 
 #[inline(always)]
-fn any_with<S: Simd>(simd: S, asked: &Asked) -> bool {
-    match LocalRay::new(simd, asked.mesh.frame(), asked.ray, asked.within()) {
-        Some(local) => any_along::<S, true>(simd, asked, &local),
-        None => any_uncommon(simd, asked),
+fn any_with<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
+    match LocalRay::new(simd, mesh.frame(), ray, within) {
+        Some(local) => any_along::<S, true>(simd, mesh, ray, within, &local),
+        None => any_uncommon(simd, mesh, ray, within),
     }
 }
 
 #[inline(never)]
-fn any_uncommon<S: Simd>(simd: S, asked: &Asked) -> bool {
+fn any_uncommon<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> bool {
     simd.vectorize(
         #[inline(always)]
-        move || match LocalRay::uncommon(simd, asked.mesh.frame(), asked.ray, asked.within()) {
-            Some(local) => any_along::<S, false>(simd, asked, &local),
-            None => closest_of_all(asked.mesh, asked.ray, asked.within()).is_some(),
+        move || match LocalRay::uncommon(simd, mesh.frame(), ray, within) {
+            Some(local) => any_along::<S, false>(simd, mesh, ray, within, &local),
+            None => closest_of_all(mesh, ray, within).is_some(),
         },
     )
 }
 
 #[inline(always)]
-fn any_along<S: Simd, const FORWARD: bool>(simd: S, asked: &Asked, local: &LocalRay) -> bool {
-    let &Asked { ray, mesh, .. } = asked;
-    let mut first = First { mesh, ray, within: asked.within(), local, probe: Probe::new(local, mesh.exact) };
-    bvh::any(simd, &mesh.tree, &Lanes::<S, FORWARD>::new(simd, local), local.t_max, &mut first)
+fn any_along<S: Simd, const FORWARD: bool>(
+    simd: S,
+    mesh: &Mesh,
+    ray: &Ray,
+    within: Interval,
+    local: &LocalRay,
+) -> bool {
+    let (probe, ends) = probe_and_ends::<FORWARD>(mesh, local);
+    let mut first = First { leaves: &mesh.leaves, mesh, ray, within, ends, probe };
+    bvh::any(simd, &mesh.tree, &Lanes::<S, FORWARD>::new(simd, local), ends.t_max, &mut first)
 }
 
 /// A ray that has no place in the tree's frame.
@@ -194,7 +246,8 @@ pub(super) fn exactly<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval
 /// A triangle that is certainly hit, at this t or later.
 #[derive(Clone, Copy)]
 struct Passed {
-    spot: Spot,
+    /// [`Spot::packed`]: all that are remembered are one vector, to begin with.
+    spot: u32,
     t: f32,
 }
 
@@ -207,8 +260,7 @@ struct Nearest<'a> {
     ray: &'a Ray,
     within: Interval,
     limits: Limits,
-    sure: Sure,
-    t_max: f32,
+    ends: Ends,
     passed: [Passed; MOST_PASSED],
     count: usize,
     best: Option<Hit>,
@@ -216,9 +268,9 @@ struct Nearest<'a> {
 
 impl<'a> Nearest<'a> {
     #[inline(always)]
-    fn new(mesh: &'a Mesh, ray: &'a Ray, within: Interval, limits: Limits, sure: Sure, t_max: f32) -> Self {
-        let passed = [Passed { spot: Spot { leaf: 0, lane: 0 }, t: 0.0 }; MOST_PASSED];
-        Self { mesh, ray, within, limits, sure, t_max, passed, count: 0, best: None }
+    fn new(mesh: &'a Mesh, ray: &'a Ray, within: Interval, limits: Limits, ends: Ends) -> Self {
+        let passed = [Passed { spot: 0, t: 0.0 }; MOST_PASSED];
+        Self { mesh, ray, within, limits, ends, passed, count: 0, best: None }
     }
 
     /// The answer. `probe`: of a ray that is taken as it is.
@@ -227,7 +279,7 @@ impl<'a> Nearest<'a> {
         match (self.count, self.best.is_some()) {
             (0, false) => None,
             (1, false) => {
-                let spot = self.passed[0].spot;
+                let spot = Spot::of(self.passed[0].spot);
                 match settle_one(simd, self.mesh, self.ray, spot, probe) {
                     Some(hit) => Some(hit),
                     None => self.exactly_apart(simd, spot),
@@ -255,16 +307,16 @@ impl<'a> Nearest<'a> {
     /// Whether no more is to be done at once with a triangle that the line certainly passes through: it is too far, or certainly a hit.
     #[inline(always)]
     fn remember(&mut self, spot: Spot, [low, high]: [f32; 2]) -> bool {
-        if low > self.t_max {
+        if low > self.ends.t_max {
             return true;
         }
-        if !self.sure.holds([low, high]) | (self.count == MOST_PASSED) {
+        if !self.ends.sure.holds([low, high]) | (self.count == MOST_PASSED) {
             return false;
         }
-        if high < self.t_max {
-            self.t_max = high;
+        if high < self.ends.t_max {
+            self.ends.t_max = high;
         }
-        self.passed[self.count % MOST_PASSED] = Passed { spot, t: low };
+        self.passed[self.count % MOST_PASSED] = Passed { spot: spot.packed(), t: low };
         self.count += 1;
         true
     }
@@ -274,8 +326,8 @@ impl<'a> Nearest<'a> {
     fn decide<S: Simd>(&mut self, simd: S) {
         for i in 0..std::mem::take(&mut self.count) {
             let Passed { spot, t } = self.passed[i % MOST_PASSED];
-            if t <= self.t_max {
-                self.confirm(simd, spot);
+            if t <= self.ends.t_max {
+                self.confirm(simd, Spot::of(spot));
             }
         }
     }
@@ -298,8 +350,8 @@ impl<'a> Nearest<'a> {
                 let best = nearer(self.mesh, self.ray, self.best, hit);
                 self.best = Some(best);
                 let t = self.limits.upper(best.lambda + best.error);
-                if t < self.t_max {
-                    self.t_max = t;
+                if t < self.ends.t_max {
+                    self.ends.t_max = t;
                 }
             },
         );
@@ -308,36 +360,40 @@ impl<'a> Nearest<'a> {
 
 /// One ray's walk to the nearest hit.
 struct Single<'a> {
+    leaves: &'a [Leaf],
     probe: Probe,
     nearest: Nearest<'a>,
 }
 
 impl<S: Simd> bvh::Closest<S> for Single<'_> {
     #[inline(always)]
-    fn leaf(&mut self, simd: S, leaf: u32) -> f32 {
-        self.visit(simd, leaf);
-        self.nearest.t_max
+    fn leaf(&mut self, simd: S, number: u32) -> f32 {
+        let leaf = &self.leaves[number as usize];
+        f32::from_bits(self.visit(simd, leaf, number))
     }
 }
 
 impl Single<'_> {
-    /// Out of line, so that the walk keeps its registers.
+    /// Returns t_max by its bits, which the walk compares. Out of line, so that it keeps its registers.
     #[inline(never)]
-    fn visit<S: Simd>(&mut self, simd: S, leaf: u32) {
+    fn visit<S: Simd>(&mut self, simd: S, triangles: &Leaf, leaf: u32) -> u32 {
         simd.vectorize(
             #[inline(always)]
             move || {
-                let triangles = &self.nearest.mesh.leaves[leaf as usize];
-                let Some(outcome) = self.probe.test(simd, triangles, self.nearest.t_max) else { return };
-                let &Outcome { maybe, through, ref depths } = &outcome;
-                // Most often it is one.
-                let lane = maybe.trailing_zeros();
-                let alone = maybe.is_power_of_two() & (through >> lane & 1 == 1);
-                if !(alone && self.nearest.remember(Spot { leaf, lane }, depths.interval(lane as usize))) {
-                    self.candidates(simd, leaf, &outcome);
+                let Ends { t_min, t_max, .. } = self.nearest.ends;
+                if let Some(verdict) = self.probe.test(simd, triangles, [t_min, t_max]) {
+                    let outcome = verdict.outcome();
+                    let &Outcome { maybe, through, ref depths } = &outcome;
+                    // Most often it is one.
+                    let lane = maybe.trailing_zeros();
+                    let alone = maybe.is_power_of_two() & (through >> lane & 1 == 1);
+                    if !(alone && self.nearest.remember(Spot { leaf, lane }, depths.interval(lane as usize))) {
+                        self.candidates(simd, leaf, &outcome);
+                    }
                 }
+                self.nearest.ends.t_max.to_bits()
             },
-        );
+        )
     }
 
     #[inline(never)]
@@ -354,17 +410,18 @@ impl Single<'_> {
 
 /// The walk to any hit: the filter's certainty is enough.
 struct First<'a> {
+    leaves: &'a [Leaf],
     mesh: &'a Mesh,
     ray: &'a Ray,
     within: Interval,
-    local: &'a LocalRay,
+    ends: Ends,
     probe: Probe,
 }
 
 impl<S: Simd> bvh::Any<S> for First<'_> {
     #[inline(always)]
     fn leaf(&mut self, simd: S, leaf: u32) -> bool {
-        self.visit(simd, &self.mesh.leaves[leaf as usize])
+        self.visit(simd, &self.leaves[leaf as usize])
     }
 }
 
@@ -373,20 +430,18 @@ impl First<'_> {
     fn visit<S: Simd>(&self, simd: S, leaf: &Leaf) -> bool {
         simd.vectorize(
             #[inline(always)]
-            move || match self.probe.test(simd, leaf, self.local.t_max) {
-                Some(outcome) => self.candidates(simd, leaf, &outcome),
-                None => false,
+            move || {
+                let Ends { sure, t_min, t_max } = self.ends;
+                let Some(verdict) = self.probe.test(simd, leaf, [t_min, t_max]) else { return false };
+                verdict.certain(simd, sure) != 0 || self.candidates(simd, leaf, verdict.maybe)
             },
         )
     }
 
     #[inline(never)]
-    fn candidates<S: Simd>(&self, simd: S, leaf: &Leaf, outcome: &Outcome) -> bool {
-        let &Outcome { maybe: lanes, through, ref depths } = outcome;
-        let sure = self.local.sure;
-        let each = |lanes: u32| (0..8).filter(move |lane| lanes >> lane & 1 == 1);
-        each(lanes & through).any(|lane| sure.holds(depths.interval(lane)))
-            || each(lanes).any(|lane| occluded(simd, self.mesh, self.ray, self.within, leaf, lane))
+    fn candidates<S: Simd>(&self, simd: S, leaf: &Leaf, lanes: u32) -> bool {
+        let mut lanes = (0..8).filter(|lane| lanes >> lane & 1 == 1);
+        lanes.any(|lane| occluded(simd, self.mesh, self.ray, self.within, leaf, lane))
     }
 }
 

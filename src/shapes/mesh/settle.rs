@@ -264,7 +264,9 @@ mod tests {
                     let local = LocalRay::new(simd, mesh.frame(), ray, Interval::FORWARD).expect("an ordinary ray");
                     let probe = Probe::new(&local, mesh.exact);
                     for (number, leaf) in mesh.leaves.iter().enumerate() {
-                        let Some(outcome) = probe.test(simd, leaf, local.t_max) else { continue };
+                        let ends = local.ends;
+                        let Some(verdict) = probe.test(simd, leaf, [ends.t_min, ends.t_max]) else { continue };
+                        let outcome = verdict.outcome();
                         for lane in (0..8).filter(|lane| (outcome.maybe & outcome.through) >> lane & 1 == 1) {
                             let [a, b, c] = leaf.vertices(lane, &mesh);
                             let (m1, m2) = (largest(b - a), largest(c - a));
@@ -280,7 +282,7 @@ mod tests {
                             }
                             through += 1;
                             let spot = Spot { leaf: number as u32, lane: lane as u32 };
-                            if probe.t_min < outcome.depths.interval(lane)[0]
+                            if ends.t_min < outcome.depths.interval(lane)[0]
                                 && let Some(hit) = settle_one(simd, &mesh, ray, spot, Some(&probe))
                             {
                                 assert_eq!(Some(hit), exactly(simd, &mesh, ray, Interval::FORWARD, spot));
