@@ -221,7 +221,7 @@ fn as_it_is<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<Placed<S>> {
         .relaxed_narrow((pair(o.z, 0.0) - pair(c.z, 0.0)) * frame.scale);
     let [size, length] = sizes(origin, direction);
     // A NaN fails every comparison.
-    if !((size <= NEAR) & (length >= LENGTHS[0]) & (length <= LENGTHS[1])) {
+    if !((size <= NEAR) & (LENGTHS[0]..=LENGTHS[1]).contains(&length)) {
         return None;
     }
     Some(Placed { origin, direction, size, length, error: PLAIN_ERROR, steepest: STEEPEST, limits: Limits::PLAIN })

@@ -7,32 +7,31 @@ use super::slab::LocalRay;
 use super::wide::{CHILDREN, LEAF, NONE, Wide, WideNode, near_rows};
 use fearless_simd::{Simd, f32x8, i32x8, prelude::*};
 
-/// What is left to visit, each with the t where its box begins in the highest bits. As signed integers they sort as t does, but for
-/// negative ones among themselves: boxes that the ray starts in come first. Kept in a fixed array; what does not fit,
-/// which no sensible tree needs, goes to the heap. Array and heap are the caller's, so that the length stays in a register.
-struct Stack<'a> {
-    entries: &'a mut Entries,
+/// What is left to visit. Kept in a fixed array; what does not fit, which no sensible tree needs, goes to the heap. Array and heap are
+/// the caller's, so that the length stays in a register.
+struct Stack<'a, E> {
+    entries: &'a mut Entries<E>,
     len: usize,
-    spilled: &'a mut Spilled,
+    spilled: &'a mut Spilled<E>,
 }
 
 /// Nothing, as a rule, which one word tells.
-type Spilled = Option<Box<Vec<i64>>>;
+type Spilled<E> = Option<Box<Vec<E>>>;
 
 /// Aligned, since it is cleared by vectors.
 #[repr(align(32))]
-struct Entries([i64; ROOM]);
+struct Entries<E>([E; ROOM]);
 
 const ROOM: usize = 32;
 
-impl<'a> Stack<'a> {
+impl<'a, E: Copy + PartialOrd> Stack<'a, E> {
     #[inline(always)]
-    fn new(entries: &'a mut Entries, spilled: &'a mut Spilled) -> Self {
+    fn new(entries: &'a mut Entries<E>, spilled: &'a mut Spilled<E>) -> Self {
         Self { entries, len: 0, spilled }
     }
 
     #[inline(always)]
-    fn slot(&mut self, at: usize) -> &mut i64 {
+    fn slot(&mut self, at: usize) -> &mut E {
         &mut self.entries.0[at & (ROOM - 1)]
     }
 
@@ -46,20 +45,20 @@ impl<'a> Stack<'a> {
     }
 
     #[inline(always)]
-    fn push(&mut self, entry: i64) {
+    fn push(&mut self, entry: E) {
         *self.slot(self.len) = entry;
         self.len += 1;
     }
 
     #[inline(always)]
-    fn push_if(&mut self, entry: i64, really: bool) {
+    fn push_if(&mut self, entry: E, really: bool) {
         *self.slot(self.len) = entry;
         self.len += usize::from(really);
     }
 
     /// Pushes below all of the last `count` that are nearer.
     #[inline(always)]
-    fn insert(&mut self, entry: i64, count: usize) {
+    fn insert(&mut self, entry: E, count: usize) {
         let mut at = self.len;
         while at > self.len - count && *self.slot(at - 1) < entry {
             *self.slot(at) = *self.slot(at - 1);
@@ -70,7 +69,7 @@ impl<'a> Stack<'a> {
     }
 
     #[inline(always)]
-    fn pop(&mut self) -> Option<i64> {
+    fn pop(&mut self) -> Option<E> {
         if self.len == 0 {
             return self.spilled.as_mut()?.pop();
         }
@@ -81,7 +80,7 @@ impl<'a> Stack<'a> {
 
 #[cold]
 #[inline(never)]
-fn spill(to: &mut Spilled, entries: &[i64]) {
+fn spill<E: Copy>(to: &mut Spilled<E>, entries: &[E]) {
     to.get_or_insert_default().extend_from_slice(entries);
 }
 
@@ -112,7 +111,8 @@ fn lane_of(hits: u32) -> usize {
     hits.trailing_zeros() as usize & 7
 }
 
-/// A child, and the t where its box begins.
+/// A child, and the t where its box begins in the highest bits: as signed integers they sort as t does, but for negative ones among
+/// themselves. Boxes that the ray starts in come first.
 #[inline(always)]
 fn entry(child: u32, t: f32) -> i64 {
     (u64::from(t.to_bits()) << 32 | u64::from(child)) as i64
@@ -300,19 +300,19 @@ pub(crate) fn any<S: Simd, const FORWARD: bool>(
             // Two of the others without a branch on whether they are there.
             for _ in 0..2 {
                 let i = (hits | 1).ilog2();
-                stack.push_if(i64::from(child(i as usize)), hits != 0);
+                stack.push_if(child(i as usize), hits != 0);
                 hits &= !(1 << i);
             }
             while hits != 0 {
                 let i = hits.ilog2();
                 hits &= !(1 << i);
-                stack.push(i64::from(child(i as usize)));
+                stack.push(child(i as usize));
             }
         }
         if at != NONE && leaves.leaf(simd, at & !LEAF) {
             return true;
         }
         let Some(next) = stack.pop() else { return false };
-        at = next as u32;
+        at = next;
     }
 }

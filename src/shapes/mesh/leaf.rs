@@ -268,11 +268,11 @@ impl<M> Sides<M> {
         // The sign of det goes to t's numerator. Where it is uncertain the far margin is wide enough for both, and nothing is
         // said to lie before t_min.
         let size_of_det = det.abs();
-        let signed = t * V::splat(simd, 1.0).copysign(det);
+        let signed = V::from_bits(t.to_bits() ^ (det.to_bits() & V::splat(simd, -0.0).to_bits()));
         let depth = of_det.mul_add(t_min.abs().max(last.abs()), of_t);
-        let beyond = (signed - size_of_det * last).simd_gt(depth);
+        let beyond = size_of_det.mul_sub(last, signed).simd_lt(-depth);
         let near = of_det.mul_add(t_min.abs(), of_t);
-        let before = (signed - size_of_det * t_min).simd_lt(-near) & size_of_det.simd_gt(of_det);
+        let before = size_of_det.mul_sub(t_min, signed).simd_gt(near) & size_of_det.simd_gt(of_det);
         let maybe = self.maybe & !((beyond | before).to_bitmask() as u32);
         Sighting { maybe, through: self.through, signed, size_of_det, depth }
     }
