@@ -113,7 +113,7 @@ impl LocalRay {
         let simd = origin.simd;
         let splat = |x: f32| f32x4::splat(simd, x);
         let inv = splat(1.0) / largest_of(direction.abs(), splat(1.0 / steepest)).copysign(direction);
-        // Against the way the ray goes: what is met first is as if the origin lay farther on, what is met last as if farther back.
+        // With the direction's sign: planes met first are met as if the origin lay farther on, the others as if farther back.
         let pad = origin.abs().mul_add(splat(SLAB), splat(SLAB + 2.0 * error)).copysign(direction);
         Self {
             away: direction.bitcast::<i32x4<S>>().simd_lt(i32x4::splat(simd, 0)).to_bitmask() as u32,
@@ -147,6 +147,7 @@ impl Limits {
         ((t + slack) + t.abs() * NARROWING) as f32
     }
 
+    /// The interval in t, rounded both ways.
     #[inline(always)]
     fn of<S: Simd>(&self, simd: S, within: Interval) -> Ends {
         let splat = |x: f64| f64x2::<S>::splat(simd, x);
