@@ -87,13 +87,27 @@ impl<'a> Surface<'a> {
         let outward = direction.dot(self.normal) >= 0.0;
         // At least a unit in the last place of the largest coordinate, or adding the step would do nothing.
         let least = (2.0 * self.error).max(self.point.abs().max_element() * f64::EPSILON).max(f64::MIN_POSITIVE);
-        let away = |outward: bool| if outward { self.normal } else { -self.normal };
         let from = |outward: bool, step: f64| {
-            let origin = self.point + step * away(outward);
+            let origin = self.point + (if outward { step } else { -step }) * self.normal;
             Ray { origin, direction: direction_from(origin) }
         };
         let departs = |ray: &Ray, outward: bool| ray.is_valid() && self.shape.departs(ray, &self.hit, outward);
+        let first = from(outward, least);
+        if departs(&first, outward) { first } else { self.search(outward, least, &from, &departs) }
+    }
+
+    /// Where the first step does not do.
+    #[cold]
+    #[inline(never)]
+    fn search(
+        &self,
+        outward: bool,
+        least: f64,
+        from: &dyn Fn(bool, f64) -> Ray,
+        departs: &dyn Fn(&Ray, bool) -> bool,
+    ) -> Ray {
         let steps = || (0..DOUBLINGS).map(|k| least * f64::from(1u32 << k));
+        let away = if outward { self.normal } else { -self.normal };
         // A direction along the surface may lie on one side of the rounded normal's plane and on the other of the exact
         // one: the exact test then never lets go on the first side.
         for side in [outward, !outward] {
@@ -103,7 +117,7 @@ impl<'a> Surface<'a> {
         }
         // A target that the surface itself hides, or that its ray reaches before coming down to the surface: only the
         // origin can be clear of it.
-        let clear = |ray: &Ray| ray.is_valid() && departs(&Ray { direction: away(outward), ..*ray }, outward);
+        let clear = |ray: &Ray| ray.is_valid() && departs(&Ray { direction: away, ..*ray }, outward);
         if let Some(ray) = steps().map(|step| from(outward, step)).find(clear) {
             return ray;
         }

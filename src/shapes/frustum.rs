@@ -26,6 +26,7 @@ struct Foot {
     local: Local,
     /// top − base; longer, where scaling would have left nothing of it.
     axis: DVec3,
+    axis_length: f64,
     end: DVec3,
     /// From the base 0 to 1, from the top −1 to 0.
     along: f64,
@@ -33,6 +34,9 @@ struct Foot {
     height: f64,
     /// Perpendicular to the axis; as long as the point's distance from it before any projection.
     radial: DVec3,
+    /// Its length, and it over that: none on the axis.
+    from_axis: f64,
+    outward: Option<DVec3>,
     /// The wall's radius at this height.
     radius: f64,
 }
@@ -96,6 +100,7 @@ impl Frustum {
         let (axis, times) = self.axis();
         let axis = local.vector(axis) * times;
         let axis = if axis.abs().max_element() < local.lost() { local.lost() * self.direction() } else { axis };
+        let axis_length = length(axis);
         let foot = |lambda| {
             let from_base = local.offset(ray, lambda, self.base);
             let height = along(from_base, axis);
@@ -110,7 +115,8 @@ impl Frustum {
             let radial = radial - along(radial, axis) * axis;
             let at = if height <= 0.5 { at.clamp(0.0, 1.0) } else { at.clamp(-1.0, 0.0) };
             let height = if height <= 0.5 { at } else { 1.0 + at };
-            Foot { local, axis, end, along: at, height, radial, radius: r + at * (r1 - r0) }
+            let (from_axis, outward, radius) = (length(radial), unit(radial), r + at * (r1 - r0));
+            Foot { local, axis, axis_length, end, along: at, height, radial, from_axis, outward, radius }
         };
         let rough = foot([hit.lambda, 0.0]);
         let moved = local.inside(hit.error * length(ray.direction));
@@ -133,7 +139,7 @@ impl Frustum {
     /// cos·radial − sin·axis, with tan = Δr/height. At an apex, where no radial direction is left, along the axis.
     fn wall_normal(&self, f: &Foot, axis: DVec3, ray: &Ray) -> DVec3 {
         let growth = f.local.inside(self.top_radius - self.base_radius);
-        let Some(radial) = unit(f.radial) else {
+        let Some(radial) = f.outward else {
             if growth != 0.0 {
                 return -axis * growth.signum();
             }
@@ -141,7 +147,7 @@ impl Frustum {
             let across = ray.direction - along(ray.direction, f.axis) * f.axis;
             return unit(-across).unwrap_or_else(|| axis.any_orthonormal_vector());
         };
-        unit(length(f.axis) * radial - growth * axis).unwrap_or(radial)
+        unit(f.axis_length * radial - growth * axis).unwrap_or(radial)
     }
 
     pub(super) fn contact(&self, ray: &Ray, hit: &Hit) -> (SurfacePoint, Tangent) {
@@ -159,23 +165,21 @@ impl Frustum {
 
     fn point_at(&self, f: &Foot, hit: &Hit) -> SurfacePoint {
         let (r0, r1) = (f.local.inside(self.base_radius), f.local.inside(self.top_radius));
-        let clamped = |r: f64| {
-            let from_axis = length(f.radial);
-            if from_axis <= r { f.radial } else { r * unit(f.radial).unwrap_or(DVec3::ZERO) }
-        };
+        let outward = f.outward.unwrap_or(DVec3::ZERO);
+        let clamped = |r: f64| if f.from_axis <= r { f.radial } else { r * outward };
         let (foot, radial) = match hit.part {
             BASE => (self.base, clamped(r0)),
             TOP => (self.top, clamped(r1)),
             _ => {
                 let foot = f.end + f.local.vector_outside(f.along * f.axis);
-                (foot, f.radius * unit(f.radial).unwrap_or(DVec3::ZERO))
+                (foot, f.radius * outward)
             }
         };
         let radial = f.local.vector_outside(radial);
         let position = foot + radial;
         // docs/numerics.md §6: radial direction and its length, the foot, and the two sums.
         let rounding = 12.0 * U * self.base_radius.max(self.top_radius)
-            + 6.0 * U * f.local.outside(length(f.axis))
+            + 6.0 * U * f.local.outside(f.axis_length)
             + 2.0 * length(U * foot)
             + 2.0 * length(U * position);
         SurfacePoint { position, error: rounding + f.local.outside(f.local.lost()) + f64::from_bits(16) }
@@ -221,11 +225,7 @@ impl Frustum {
     }
 
     pub(super) fn departs(&self, ray: &Ray, outward: bool) -> bool {
-        if !ray.is_valid() {
-            return false;
-        }
-        let side = frustum::side(ray.origin, self.base, self.top, self.base_radius, self.top_radius);
-        if outward { side.is_gt() && self.intersect(ray, Interval::FORWARD).is_none() } else { side.is_lt() }
+        frustum::departs(ray, self.base, self.top, self.base_radius, self.top_radius, outward)
     }
 
     /// A cone's wall curves at most as its circle does (by the cosine less). The radial part of its normal is off by 8u of
@@ -235,11 +235,10 @@ impl Frustum {
         if hit.part == BASE || hit.part == TOP {
             return Tangent { normal, normal_error: 16.0 * U, curvature: 0.0 };
         }
-        let radial = length(f.radial);
         // A part of the smallest subnormals has no digits.
-        let rounding = 8.0 * U * (radial + length(f.along * f.axis)) + f64::from_bits(16);
+        let rounding = 8.0 * U * (f.from_axis + length(f.along * f.axis)) + f64::from_bits(16);
         let curvature = 1.0 / f.local.outside(f.radius * (1.0 - 16.0 * U));
-        Tangent { normal, normal_error: 16.0 * U + rounding / radial, curvature }
+        Tangent { normal, normal_error: 16.0 * U + rounding / f.from_axis, curvature }
     }
 
     /// Half of ∇f for f(p) = |x|² − t²/h² − R(t)², with x = p − base, t = x·v, v = top − base, h² = |v|².

@@ -132,11 +132,7 @@ impl Shape for Sphere {
     }
 
     fn departs(&self, ray: &Ray, _hit: &Hit, outward: bool) -> bool {
-        if !ray.is_valid() {
-            return false;
-        }
-        let side = sphere::side(ray.origin, self.center, self.radius);
-        if outward { side.is_gt() && self.intersect(ray, Interval::FORWARD).is_none() } else { side.is_lt() }
+        sphere::departs(ray, self.center, self.radius, outward)
     }
 
     fn precise_lambda(&self, ray: &Ray, hit: &Hit) -> [f64; 2] {

@@ -5,6 +5,7 @@
 //! is told by signs alone, before any λ is known; docs/numerics.md §6.
 
 mod fast;
+mod leaving;
 
 use super::cpu;
 use super::eft::{Fused, Split};
@@ -72,6 +73,19 @@ fn refine(ray: &Ray, base: &DVec3, top: &DVec3, r0: f64, r1: f64, min: f64, max:
 pub fn side(point: DVec3, base: DVec3, top: DVec3, base_radius: f64, top_radius: f64) -> Ordering {
     let solid = Solid { base, top, base_radius, top_radius };
     refined!(locate(point, &solid)).unwrap_or(Ordering::Greater)
+}
+
+/// Whether `ray` starts strictly outside the solid and does not meet it, or for `outward` = false starts strictly inside: both
+/// exactly. A solid that [`intersect`] accepts.
+#[must_use]
+pub fn departs(ray: &Ray, base: DVec3, top: DVec3, base_radius: f64, top_radius: f64, outward: bool) -> bool {
+    let solid = Solid { base, top, base_radius, top_radius };
+    ray.is_valid()
+        && (leaving::is_certain(ray, &solid, outward) || {
+            let side = side(ray.origin, base, top, base_radius, top_radius);
+            let misses = || intersect(ray, base, top, base_radius, top_radius, Interval::FORWARD).is_none();
+            if outward { side.is_gt() && misses() } else { side.is_lt() }
+        })
 }
 
 /// λ of the hit at about `lambda`, to a hundred bits, as an unevaluated sum.

@@ -176,6 +176,18 @@ pub fn side(point: DVec3, center: DVec3, radius: f64) -> Ordering {
     refined!(locate(point, center, radius)).unwrap_or(Ordering::Greater)
 }
 
+/// Whether `ray` starts strictly outside the sphere and does not meet it, or for `outward` = false starts strictly inside: both
+/// exactly. A sphere that [`intersect`] accepts.
+#[must_use]
+pub fn departs(ray: &Ray, center: DVec3, radius: f64, outward: bool) -> bool {
+    ray.is_valid()
+        && (near::is_leaving(ray, center, radius, outward) || {
+            let misses = || intersect(ray, center, radius, Interval::FORWARD).is_none();
+            let side = side(ray.origin, center, radius);
+            if outward { side.is_gt() && misses() } else { side.is_lt() }
+        })
+}
+
 /// λ of the hit at about `lambda`, to a hundred bits, as an unevaluated sum.
 #[must_use]
 pub fn precise_lambda(ray: &Ray, center: DVec3, radius: f64, lambda: f64) -> [f64; 2] {

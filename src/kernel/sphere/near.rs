@@ -40,6 +40,17 @@ pub(super) fn is_behind(f: DVec3, d: DVec3, b: f64, r: f64) -> bool {
     (c * b > 0.0) & (c.abs() > PLAIN_C * (r * r)) & (b.abs() > PLAIN_B * (r * taxicab(d)))
 }
 
+/// Whether plain arithmetic is certain that a ray starts outside, next to the sphere, and moves away from it, or, if not
+/// `outward`, that it starts inside.
+#[inline(always)]
+pub(super) fn is_leaving(ray: &Ray, center: DVec3, r: f64, outward: bool) -> bool {
+    let (f, d) = (ray.origin - center, ray.direction);
+    let (b, c, r2) = (plain_dot(f, d), plain_dot(f, f) - r * r, r * r);
+    let next = super::is_ordinary(f, d, r) & (c.abs() <= NEXT * r2);
+    let away = (c > PLAIN_C * r2) & (b > PLAIN_B * (r * taxicab(d)));
+    next & if outward { away } else { c < -PLAIN_C * r2 }
+}
+
 /// The nearest hit inside `within`. The ray is ordinary, D is certainly positive, |A·C| ≤ [`NEXT`]·A·r². Scalars, so that
 /// the caller's vectors stay in registers.
 #[inline(never)]
@@ -376,6 +387,27 @@ mod tests {
         });
         println!("{rays} rays that start next to a sphere, {hits} hits, {cold} refined");
         assert!(rays > 50_000 && 3 * hits > rays && 20 * cold < rays);
+    }
+
+    /// Whether a ray has left is told in plain arithmetic, mostly, and as exactly as otherwise.
+    #[test]
+    fn what_is_certain_of_leaving_is_true() {
+        use super::super::{departs, intersect, side};
+        let (mut certain, mut departed) = ([0; 2], [0; 2]);
+        each(40_000, 12, |x| {
+            let Some((ray, center, r)) = setting(x) else { return };
+            let from = side(ray.origin, center, r);
+            let misses = intersect(&ray, center, r, Interval::FORWARD).is_none();
+            for (outward, exactly) in [(true, from.is_gt() && misses), (false, from.is_lt())] {
+                assert_eq!(departs(&ray, center, r, outward), exactly, "{ray:?} {center} {r:e}");
+                let quick = is_leaving(&ray, center, r, outward);
+                assert!(exactly || !quick, "{ray:?} {center} {r:e}");
+                certain[usize::from(outward)] += usize::from(quick);
+                departed[usize::from(outward)] += usize::from(exactly);
+            }
+        });
+        println!("{certain:?} certain (inward, outward) of {departed:?} that leave a sphere");
+        assert!(certain.iter().zip(departed).all(|(&n, all)| n > 5_000 && 3 * n > 2 * all));
     }
 
     /// However little a point is off the sphere, it is not on it.
