@@ -71,7 +71,7 @@ impl<'a, E: Copy + PartialOrd> Stack<'a, E> {
     #[inline(always)]
     fn pop(&mut self) -> Option<E> {
         if self.len == 0 {
-            return self.spilled.as_mut()?.pop();
+            return if self.spilled.is_some() { spilled(self.spilled) } else { None };
         }
         self.len -= 1;
         Some(*self.slot(self.len))
@@ -82,6 +82,13 @@ impl<'a, E: Copy + PartialOrd> Stack<'a, E> {
 #[inline(never)]
 fn spill<E: Copy>(to: &mut Spilled<E>, entries: &[E]) {
     to.get_or_insert_default().extend_from_slice(entries);
+}
+
+/// Out of line: inlined, its load and that of the array are made one, of an address that takes longer to find.
+#[cold]
+#[inline(never)]
+fn spilled<E>(entries: &mut Spilled<E>) -> Option<E> {
+    entries.as_mut()?.pop()
 }
 
 #[inline(always)]
