@@ -188,6 +188,15 @@ impl Sixteen {
         low.simd_gt(min) & high.simd_lt(max)
     }
 
+    /// Nothing of ray `lane` matters from `t` on. All are written, since they are read as a vector, which would have to wait for
+    /// one written alone.
+    #[inline(always)]
+    pub(crate) fn shorten<S: Simd>(&mut self, simd: S, lane: usize, t: f32) {
+        let (t_max, this): (f32x16<S>, _) =
+            (self.t_max.simd_into(simd), mask32x16::from_bitmask(simd, 1 << (lane & 15)));
+        self.t_max = this.select(t_max.min(f32x16::splat(simd, t)), t_max).into();
+    }
+
     #[inline(always)]
     fn slab<S: Simd>(&self, simd: S, axis: usize) -> (f32x16<S>, f32x16<S>, f32x16<S>) {
         (self.inv[axis].simd_into(simd), self.near_shift[axis].simd_into(simd), self.far_shift[axis].simd_into(simd))

@@ -54,7 +54,7 @@ trait Answers<S: Simd>: Sized {
     fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, depth: [f32; 2]) -> bool;
 
     /// Keeps the bundle's t_max, after a leaf.
-    fn shorten(simd: S, bundle: &mut Bundle);
+    fn shorten(walk: &mut Walk<Self>, simd: S);
 }
 
 impl<'a, A> Walk<'a, A> {
@@ -79,7 +79,7 @@ impl<'a, A> Walk<'a, A> {
         let seen = Seen::new(simd, &triangles, view, &self.margins);
         let mut lanes = if rays.count_ones() <= FEW { 0xff } else { seen.lanes(simd, view) };
         if rays.count_ones() <= lanes.count_ones() * SIXTEENS as u32 {
-            let seen = seen.twice();
+            let seen = seen.twice(simd);
             while rays != 0 {
                 let others = rays & (rays - 1);
                 let two = [rays.trailing_zeros() as usize, others.trailing_zeros() as usize % RAYS];
@@ -169,7 +169,7 @@ impl<S: Simd, A: Answers<S>> bvh::Together<S> for Walk<'_, A> {
                     Some(view) => self.visit_from(simd, &view, leaf, rays),
                     None => self.visit(simd, leaf, rays),
                 }
-                A::shorten(simd, self.bundle);
+                A::shorten(self, simd);
             },
         );
     }
@@ -251,8 +251,7 @@ impl<S: Simd> Answers<S> for Nearests<'_> {
     fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, [low, high]: [f32; 2]) -> bool {
         let (rays, lane) = (&mut walk.bundle.rays[ray / 16], ray % 16);
         let sure = rays.holds(lane, [low, high]);
-        let t_max = &mut rays.t_max[lane];
-        if through && low > *t_max {
+        if through && low > rays.t_max[lane] {
             return false;
         }
         let of_ray = &mut walk.answers.low[ray / 16][lane];
@@ -264,15 +263,17 @@ impl<S: Simd> Answers<S> for Nearests<'_> {
         walk.answers.remembered |= 1 << ray;
         walk.answers.spot[ray / 16][lane] = spot.packed();
         walk.answers.id[ray / 16][lane] = spot.id(walk.mesh);
-        if high < *t_max {
-            *t_max = high;
-        }
+        rays.shorten(simd, lane, high);
         false
     }
 
     #[inline(always)]
-    fn shorten(simd: S, bundle: &mut Bundle) {
-        bundle.shorten(simd);
+    fn shorten(walk: &mut Walk<Self>, simd: S) {
+        // While one ray has met nothing its t_max is what it was, and mostly the largest still.
+        let Nearests { remembered, settled, .. } = walk.answers;
+        if (remembered | settled) & walk.bundle.asking == walk.bundle.asking {
+            walk.bundle.shorten(simd);
+        }
     }
 }
 
@@ -374,9 +375,9 @@ impl<S: Simd> Answers<S> for Until {
     }
 
     #[inline(always)]
-    fn shorten(_: S, bundle: &mut Bundle) {
-        if bundle.asking == 0 {
-            bundle.t_max = f32::NEG_INFINITY;
+    fn shorten(walk: &mut Walk<Self>, _: S) {
+        if walk.bundle.asking == 0 {
+            walk.bundle.t_max = f32::NEG_INFINITY;
         }
     }
 }

@@ -32,8 +32,18 @@ impl View {
     }
 }
 
-/// Triangles by lane: coefficients of the direction, t's numerator, and margins.
-pub(super) struct Seen<V> {
+/// Triangles by lane, in memory: from there one goes to all lanes, or all go to both halves of a register, by a load.
+#[repr(align(64))]
+pub(super) struct Seen([[f32; 8]; ROWS]);
+
+/// Coefficients of the direction in U, V and det, t's numerator, the margin of the edge functions and the two of the depth.
+const ROWS: usize = 13;
+
+/// The margin of a test of all directions at once, against that of one: it loses 14 roundings of |e||r||d| where that loses 12.
+const OF_ALL: f32 = 1.25;
+
+/// [`Seen`], in lanes that are compared with rays.
+pub(super) struct Sight<V> {
     u: [V; 3],
     v: [V; 3],
     det: [V; 3],
@@ -42,31 +52,62 @@ pub(super) struct Seen<V> {
     of_depth: (V, V),
 }
 
-/// The margin of a test of all directions at once, against that of one: it loses 14 roundings of |e||r||d| where that loses 12.
-const OF_ALL: f32 = 1.25;
-
-impl<S: Simd> Seen<f32x8<S>> {
+impl<V> Sight<V> {
     #[inline(always)]
-    pub(super) fn new(simd: S, triangles: &Triangles<S>, view: &View, margins: &Margins) -> Self {
+    fn of(row: impl Fn(usize) -> V) -> Self {
+        Self {
+            u: [row(0), row(1), row(2)],
+            v: [row(3), row(4), row(5)],
+            det: [row(6), row(7), row(8)],
+            t: row(9),
+            edges: row(10),
+            of_depth: (row(11), row(12)),
+        }
+    }
+}
+
+impl Seen {
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(simd: S, triangles: &Triangles<S>, view: &View, margins: &Margins) -> Self {
         let &Triangles { v0, e1, e2, size } = triangles;
         let c = minus(v0, three(simd, view.place));
         let n = cross(e1, e2);
-        let (edges, of_depth) = (margins.edges(simd, size), margins.depth(simd, size, c, n));
-        Self { u: cross(e2, c), v: cross(c, e1), det: n, t: dot(n, c), edges, of_depth }
+        let (u, v) = (cross(e2, c), cross(c, e1));
+        let (of_t, of_det) = margins.depth(simd, size, c, n);
+        let edges = margins.edges(simd, size);
+        Self([
+            u[0].into(),
+            u[1].into(),
+            u[2].into(),
+            v[0].into(),
+            v[1].into(),
+            v[2].into(),
+            n[0].into(),
+            n[1].into(),
+            n[2].into(),
+            dot(n, c).into(),
+            edges.into(),
+            of_t.into(),
+            of_det.into(),
+        ])
     }
 
     /// The lanes whose triangles may be met by one of the rays.
     #[inline(always)]
-    pub(super) fn lanes(&self, simd: S, view: &View) -> u32 {
+    pub(super) fn lanes<S: Simd>(&self, simd: S, view: &View) -> u32 {
+        let Sight { u, v, det, edges, .. } = Sight::of(
+            #[inline(always)]
+            |row| f32x8::simd_from(simd, self.0[row]),
+        );
         let (middle, half) = (three(simd, view.middle), three(simd, view.half));
-        let [u_low, u_high] = ends(self.u, middle, half);
-        let [v_low, v_high] = ends(self.v, middle, half);
-        let [w_low, w_high] = ends(minus(minus(self.det, self.u), self.v), middle, half);
-        let [det_low, det_high] = ends(self.det, middle, half);
+        let [u_low, u_high] = ends(u, middle, half);
+        let [v_low, v_high] = ends(v, middle, half);
+        let [w_low, w_high] = ends(minus(minus(det, u), v), middle, half);
+        let [det_low, det_high] = ends(det, middle, half);
         // Certainly missed by all: the denominator, or one edge function, is above zero for all and another below. The four are
         // of one sign where a triangle is hit.
         let (most, least) = (u_low.max(v_low).max(w_low), u_high.min(v_high).min(w_high));
-        let margin = self.edges * splat(simd, OF_ALL);
+        let margin = edges * splat(simd, OF_ALL);
         let (below, above) = (least.simd_lt(-margin), most.simd_gt(margin));
         let missed = (below & most.max(det_low).simd_gt(margin)) | (above & least.min(det_high).simd_lt(-margin));
         !(missed.to_bitmask() as u32) & 0xff
@@ -74,40 +115,30 @@ impl<S: Simd> Seen<f32x8<S>> {
 
     /// One triangle, in every lane.
     #[inline(always)]
-    pub(super) fn one(&self, simd: S, lane: usize) -> Seen<f32x16<S>> {
-        self.each(
+    pub(super) fn one<S: Simd>(&self, simd: S, lane: usize) -> Sight<f32x16<S>> {
+        Sight::of(
             #[inline(always)]
-            |x| f32x16::splat(simd, x[lane & 7]),
+            |row| f32x16::splat(simd, self.0[row][lane & 7]),
         )
     }
 
     /// All triangles, in the first eight lanes and in the last.
     #[inline(always)]
-    pub(super) fn twice(&self) -> Seen<f32x16<S>> {
-        self.each(
+    pub(super) fn twice<S: Simd>(&self, simd: S) -> Sight<f32x16<S>> {
+        Sight::of(
             #[inline(always)]
-            |x| x.combine(x),
+            |row| {
+                let eight = f32x8::simd_from(simd, self.0[row]);
+                eight.combine(eight)
+            },
         )
-    }
-
-    #[inline(always)]
-    fn each(&self, of: impl Fn(f32x8<S>) -> f32x16<S>) -> Seen<f32x16<S>> {
-        let Self { u, v, det, t, edges, of_depth } = *self;
-        Seen {
-            u: [of(u[0]), of(u[1]), of(u[2])],
-            v: [of(v[0]), of(v[1]), of(v[2])],
-            det: [of(det[0]), of(det[1]), of(det[2])],
-            t: of(t),
-            edges: of(edges),
-            of_depth: (of(of_depth.0), of(of_depth.1)),
-        }
     }
 }
 
 /// What is made of sixteen pairs of a ray and a triangle.
 pub(super) type SixteenSighted<S> = Sighting<f32x16<S>, mask32x16<S>>;
 
-impl<S: Simd> Seen<f32x16<S>> {
+impl<S: Simd> Sight<f32x16<S>> {
     /// One triangle against sixteen rays.
     #[inline(always)]
     pub(super) fn by(&self, simd: S, Sixteen { direction: d, t_min, t_max, .. }: &Sixteen) -> SixteenSighted<S> {
@@ -148,7 +179,8 @@ fn ends<S: Simd>(a: Vec8<S>, middle: Vec8<S>, half: Vec8<S>) -> [f32x8<S>; 2] {
 /// A lane of one row in the first eight lanes, a lane of another in the last.
 #[inline(always)]
 fn halves<S: Simd>(simd: S, [a, b]: [&[f32; 16]; 2], lanes: [usize; 2]) -> f32x16<S> {
-    splat(simd, a[lanes[0] & 15]).combine(splat(simd, b[lanes[1] & 15]))
+    let last = mask32x16::from_bitmask(simd, 0xff00);
+    last.select(f32x16::splat(simd, b[lanes[1] & 15]), f32x16::splat(simd, a[lanes[0] & 15]))
 }
 
 /// One lane of each row, in every lane.
