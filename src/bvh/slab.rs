@@ -307,3 +307,39 @@ fn largest(v: DVec3) -> f64 {
 fn exponent_of_normal(x: f64) -> i32 {
     ((x.to_bits() >> 52) & 0x7ff) as i32 - 1023
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::Level;
+    use crate::kernel::search::{Rational, climb};
+    use fearless_simd::dispatch;
+
+    fn rational(x: f64) -> Rational {
+        Rational::try_from(x).unwrap()
+    }
+
+    /// A ray meets a plane between the near t of it and the far one: how far from their middle, in halves of what lies between.
+    #[test]
+    fn no_input_reaches_the_margins() {
+        let frame = Frame { center: DVec3::ZERO, exponent: 0, scale: 1.0, unscale: 1.0 };
+        let worst = climb("planes in f32", 4, |x| {
+            let ray = Ray::new([4.0 * x[0], 0.0, 0.0], [x[1] * power((20.0 * x[2]) as i32), 1.0, 1.0]);
+            let plane = x[3] as f32;
+            let exact = (rational(plane.into()) - rational(ray.origin.x)) / rational(ray.direction.x);
+            let from_middle = |level: Level| {
+                let [near, far] = dispatch!(level.token(), simd => {
+                    let local = LocalRay::new(simd, &frame, &ray, Interval::FORWARD).expect("an ordinary ray");
+                    let (inv, planes) = (f32x4::simd_from(simd, local.inv), f32x4::splat(simd, plane));
+                    [local.near_shift, local.far_shift].map(|shift| {
+                        let t: [f32; 4] = planes.mul_sub(inv, f32x4::simd_from(simd, shift)).into();
+                        rational(t[0].into())
+                    })
+                });
+                ((&exact + &exact - &near - &far) / (far - near)).to_f64().value().abs()
+            };
+            Some(Level::all().into_iter().map(|(_, level)| from_middle(level)).fold(0.0, f64::max))
+        });
+        assert!((0.3..0.75).contains(&worst), "{worst}");
+    }
+}

@@ -4,7 +4,7 @@
 use dashu::rational::RBig;
 use glam::DVec3;
 
-pub(super) type Rational = RBig;
+pub(crate) type Rational = RBig;
 
 /// A finite vector, exactly.
 pub(super) fn exact(v: DVec3) -> [Rational; 3] {
@@ -59,7 +59,7 @@ pub(super) fn each(n: usize, dimension: usize, mut visit: impl FnMut(&[f64])) {
 }
 
 /// The largest `ratio` found: random starts, then steps of every size from the best of them, uphill.
-pub(super) fn climb(name: &str, dimension: usize, ratio: impl Fn(&[f64]) -> Option<f64>) -> f64 {
+pub(crate) fn climb(name: &str, dimension: usize, ratio: impl Fn(&[f64]) -> Option<f64>) -> f64 {
     let mut random = Random::new(1);
     let (mut best, mut tried) = (0.0, 0);
     for _ in 0..12 {
