@@ -40,6 +40,8 @@ fn shapes() -> Result<Vec<Named>, InvalidShape> {
         ("cone", Box::new(Cone::new([0.0, 0.1, -1.0], [0.1, 0.0, 1.0], 0.8)?)),
         ("mesh of 5,120 triangles", Box::new(Mesh::new(positions.clone(), triangles.clone())?)),
         ("sphere under a map", Box::new(Affine::new(Sphere::new([0.1, 0.0, -0.1], 1.1)?, map)?)),
+        ("cylinder under a map", Box::new(Affine::new(Cylinder::new([0.0, 0.1, -1.0], [0.1, 0.0, 1.0], 0.8)?, map)?)),
+        ("cone under a map", Box::new(Affine::new(Cone::new([0.0, 0.1, -1.0], [0.1, 0.0, 1.0], 0.8)?, map)?)),
         ("mesh under a map", Box::new(Affine::new(Mesh::new(positions, triangles)?, map)?)),
     ])
 }

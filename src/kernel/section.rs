@@ -62,10 +62,10 @@ impl Lambda {
         Self { exact, relative, rounded, error }
     }
 
-    /// Good enough if it is known to a thousandth of its ulp, or of an ulp of `fine`; a NaN is not.
+    /// Good enough if it is known to a thousandth of its ulp, or to a quarter of an ulp of `fine`; a NaN is not.
     fn is_sharp(&self, fine: f64) -> bool {
-        const PART: f64 = super::bound::U / 1024.0;
-        self.relative <= PART || self.relative * self.rounded.abs() <= PART * fine
+        use super::bound::U;
+        self.relative <= U / 1024.0 || self.relative * self.rounded.abs() <= 0.25 * U * fine
     }
 }
 
@@ -166,8 +166,8 @@ impl<N: Number> Quadratic<N> {
     }
 }
 
-/// The nearest of the two ends that lies inside `within`, each with the part it is on. An error of a thousandth of an
-/// ulp of `fine` will do.
+/// The nearest of the two ends that lies inside `within`, each with the part it is on. An error of a quarter of an ulp of
+/// `fine` will do.
 #[inline(always)]
 pub(super) fn nearest<N: Number>(
     [(enter, enter_part), (exit, exit_part)]: [(End<N>, u32); 2],
