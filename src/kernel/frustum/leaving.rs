@@ -72,7 +72,11 @@ fn wall(ray: &Ray, solid: &Solid) -> [Known; 2] {
     let sizes = reach + from_axis;
     let known = in_range(from_axis, 100) & (from_axis > OFF_AXIS * sizes);
     let errors = [
-        WALL[0] * reach + WALL[1] * (from_axis + radius.abs()) + WALL[2] * (growth.abs() * most),
+        // What underflow takes from x·v is multiplied by Δr/h², which may be large.
+        WALL[0] * reach
+            + WALL[1] * (from_axis + radius.abs())
+            + WALL[2] * (growth.abs() * most)
+            + UNDERFLOW * widened.abs(),
         SLOPE * taxicab(d) * sizes * (1.0 + widened.abs() * taxicab(v)),
     ];
     let values = [from_axis - radius, plain_dot(q, d) - from_axis * (widened * plain_dot(d, v))];
@@ -147,6 +151,19 @@ mod tests {
                 known.error.is_finite().then(|| ((exact - rational(known.value)).to_f64().value() / known.error).abs())
             });
             assert!((0.02..1.0).contains(&worst), "{name}: {worst}");
+        }
+    }
+
+    /// A cone so flat that heights whose products with the axis are lost count beside its radius.
+    #[test]
+    fn what_underflow_takes_is_uncertain() {
+        let (height, radius) = (power(-99), power(820));
+        let solid = Solid { base: DVec3::ZERO, top: height * DVec3::Z, base_radius: 0.0, top_radius: radius };
+        let origin = DVec3::new(power(-98), 0.0, power(-977));
+        let from = side(origin, solid.base, solid.top, 0.0, radius);
+        assert!(from.is_lt());
+        for direction in [DVec3::X, DVec3::NEG_Z, DVec3::Z, DVec3::new(1.0, 0.0, -1.0)] {
+            assert!(!departs(&Ray { origin, direction }, solid.base, solid.top, 0.0, radius, true), "{direction}");
         }
     }
 
