@@ -10,8 +10,8 @@ use fearless_simd::{Simd, dispatch, f32x4, f32x8, prelude::*};
 use std::ops::Range;
 
 /// The box in the frame around a run of objects. The last lanes hold the lower and the upper half of a number, as
-/// numbers: as bits they would be subnormals, whose arithmetic is slow even where nobody wants its result. The number is
-/// the first object's, and from bit [`COUNT`] on how many follow it.
+/// numbers: as bits they would be subnormals, whose arithmetic is slow even where nobody wants its result. The number
+/// is the first object's, and from bit [`COUNT`] on how many follow it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item(pub(super) Box8);
 

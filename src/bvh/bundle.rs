@@ -1,7 +1,7 @@
 //! Rays that go the same way, walked together.
 //!
-//! A node's boxes are tested with the bounds of all origins and inverse directions first, at the price of one ray, and each
-//! box that is next in turn with all rays, sixteen a vector: docs/numerics.md §10.
+//! A node's boxes are tested with the bounds of all origins and inverse directions first, at the price of one ray, and
+//! each box that is next in turn with all rays, sixteen a vector: docs/numerics.md §10.
 
 use super::frame::Frame;
 use super::slab::{E, FARTHEST_T, LENGTHS, Limits, NEAR, PLAIN_ERROR, SLAB, STEEPEST, TINY};
@@ -21,8 +21,8 @@ pub(crate) const SIXTEENS: usize = RAYS / 16;
 /// none of their rays meets. Rays from one place share enough without it.
 const WIDEST: f32 = 1.0 / 8.0;
 
-/// Slopes steeper than this, against the direction's longest coordinate, have inverses that bound nothing: such an axis is left
-/// out of the bounds, as is one on which the rays go either way.
+/// Slopes steeper than this, against the direction's longest coordinate, have inverses that bound nothing: such an axis
+/// is left out of the bounds, as is one on which the rays go either way.
 const FLATTEST: f32 = 1.0 / 1_048_576.0; // 2⁻²⁰
 
 /// What underflow may take from a product of a distance and an inverse, and far below any t that matters.
@@ -115,9 +115,9 @@ impl Sixteen {
         sure_max: [0.0; 16],
     };
 
-    /// Takes the rays into the frame, as [`LocalRay::new`](super::LocalRay::new) takes those that it takes as they are. Returns the
-    /// largest coordinate of each direction and of the way to the far end, and whether all intervals are longer than a
-    /// rounding of f32.
+    /// Takes the rays into the frame, as [`LocalRay::new`](super::LocalRay::new) takes those that it takes as they are.
+    /// Returns the largest coordinate of each direction and of the way to the far end, and whether all intervals are
+    /// longer than a rounding of f32.
     #[inline(always)]
     fn set<S: Simd>(
         &mut self,
@@ -188,8 +188,8 @@ impl Sixteen {
         low.simd_gt(min) & high.simd_lt(max)
     }
 
-    /// Nothing of ray `lane` matters from `t` on. All are written, since they are read as a vector, which would have to wait for
-    /// one written alone.
+    /// Nothing of ray `lane` matters from `t` on. All are written, since they are read as a vector, which would have to
+    /// wait for one written alone.
     #[inline(always)]
     pub(crate) fn shorten<S: Simd>(&mut self, simd: S, lane: usize, t: f32) {
         let (t_max, this): (f32x16<S>, _) =
@@ -258,7 +258,8 @@ pub(crate) struct Bundle {
     pub(crate) size: f32,
     /// The shortest and the longest direction, by their largest coordinates.
     pub(crate) lengths: [f32; 2],
-    /// Each coordinate of the place was off the rays by at most this before it was rounded; without one, each of an origin off its ray.
+    /// Each coordinate of the place was off the rays by at most this before it was rounded; without one, each of an
+    /// origin off its ray.
     pub(crate) origin_error: f32,
 }
 
@@ -296,9 +297,9 @@ impl Bundle {
         origin_error: 0.0,
     };
 
-    /// Makes these rays the bundle's, instead of all others; only the first `many` want to know something. `false`, and no use, if
-    /// the rays go very different ways, if one of them is not taken as it is by [`LocalRay::new`](super::LocalRay::new), or if an
-    /// interval is empty; from the end, if that is not one place.
+    /// Makes these rays the bundle's, instead of all others; only the first `many` want to know something. `false`, and
+    /// no use, if the rays go very different ways, if one of them is not taken as it is by
+    /// [`LocalRay::new`](super::LocalRay::new), or if an interval is empty; from the end, if that is not one place.
     #[inline(always)]
     pub(crate) fn take<S: Simd>(
         &mut self,
@@ -371,8 +372,8 @@ impl Bundle {
             }
             self.away |= u32::from(backward) << axis;
             (self.near_origin[axis], self.far_origin[axis]) = if backward { (low, high) } else { (high, low) };
-            // Of directions with one sign the greatest has the least inverse. The margin is for five roundings: of the direction,
-            // of its inverse, and of difference and product in the test.
+            // Of directions with one sign the greatest has the least inverse. The margin is for five roundings: of the
+            // direction, of its inverse, and of difference and product in the test.
             let (least, greatest) = (1.0 / d[1], 1.0 / d[0]);
             self.inverse[0][axis] = least - least.abs() * (8.0 * E);
             self.inverse[1][axis] = greatest + greatest.abs() * (8.0 * E);

@@ -19,8 +19,8 @@ pub(crate) struct Built {
     pub(crate) starts: Vec<u32>,
 }
 
-/// The tree over objects 0..count with the boxes given in `frame`, empty ones for no object, with at most `leaf` of them
-/// in a leaf.
+/// The tree over objects 0..count with the boxes given in `frame`, empty ones for no object, with at most `leaf` of
+/// them in a leaf.
 ///
 /// `None` if `watch` has stopped it; a tenth of its time is left to the caller.
 pub(crate) fn build(
@@ -196,8 +196,8 @@ struct Part {
 }
 
 impl Part {
-    /// The tree from the binary node `root` on. Children that `elsewhere` names are not filled but listed, with the numbers
-    /// of their wide nodes.
+    /// The tree from the binary node `root` on. Children that `elsewhere` names are not filled but listed, with the
+    /// numbers of their wide nodes.
     fn fill(
         &mut self,
         plan: &Plan,

@@ -10,7 +10,8 @@ pub struct Level {
 }
 
 impl Level {
-    /// The level that queries use by themselves: the best of this CPU that pays. AVX-512 does where many rays are walked together.
+    /// The level that queries use by themselves: the best of this CPU that pays. AVX-512 does where many rays are
+    /// walked together.
     #[must_use]
     pub fn detect() -> Self {
         let many = Detected::new();

@@ -1,9 +1,9 @@
 //! A tree of boxes that knows no shapes: objects are numbers with a box each, leaves call closures.
 //!
-//! `build` makes a binary tree by the surface area heuristic (`split`), `reinsert` moves what lies badly, `collapse` packs
-//! the tree into nodes of eight f32 boxes, `traverse` walks it front to back with one ray (`slab`) or with many that go
-//! the same way (`bundle`). Boxes are rounded outward into the frame of `frame`, and the ray's constants carry margins
-//! for every rounding between the f64 ray and the f32 boxes: no box that holds a point of the ray is skipped
+//! `build` makes a binary tree by the surface area heuristic (`split`), `reinsert` moves what lies badly, `collapse`
+//! packs the tree into nodes of eight f32 boxes, `traverse` walks it front to back with one ray (`slab`) or with many
+//! that go the same way (`bundle`). Boxes are rounded outward into the frame of `frame`, and the ray's constants carry
+//! margins for every rounding between the f64 ray and the f32 boxes: no box that holds a point of the ray is skipped
 //! (docs/numerics.md §10).
 
 mod build;
@@ -66,7 +66,8 @@ impl Bvh {
     }
 
     /// The same tree, with an observer that is told now and then which share of the build is done, from 0 to 1, never
-    /// less than before, and that may end it: then there is none. Calls come from the threads that build, one at a time.
+    /// less than before, and that may end it: then there is none. Calls come from the threads that build, one at a
+    /// time.
     ///
     /// ```
     /// use std::ops::ControlFlow;
@@ -184,8 +185,9 @@ impl Bvh {
         any(simd, &self.tree, &Lanes::<S, FORWARD>::new(simd, local), local.ends.t_max, &mut First { bvh: self, hits })
     }
 
-    /// Takes the rays of a bundle, the first `many` of which count, through the tree together: `visit(object, rays, bundle)` for every object whose box some of them
-    /// meet before their t_max, nearest boxes first, with those rays as bits. `false`, and nothing visited, if they are no bundle.
+    /// Takes the rays of a bundle, the first `many` of which count, through the tree together: `visit(object, rays,
+    /// bundle)` for every object whose box some of them meet before their t_max, nearest boxes first, with those rays
+    /// as bits. `false`, and nothing visited, if they are no bundle.
     pub(crate) fn together(
         &self,
         rays: &[Stretch; RAYS],

@@ -2,9 +2,9 @@
 
 use glam::{Vec4, Vec4Swizzles};
 
-/// A leaf holds `count` items from `first`; an inner node (`count` = 0) has its children at `first` and `first` + 1. Both
-/// are bits of the fourth coordinates, of floats that are not subnormal, whose arithmetic is slow even where nobody wants its
-/// result. Some are NaN, and are only copied.
+/// A leaf holds `count` items from `first`; an inner node (`count` = 0) has its children at `first` and `first` + 1.
+/// Both are bits of the fourth coordinates, of floats that are not subnormal, whose arithmetic is slow even where
+/// nobody wants its result. Some are NaN, and are only copied.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(super) struct Node {

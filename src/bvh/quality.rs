@@ -144,7 +144,8 @@ fn load(path: &str) -> Parts {
     (positions, triangles)
 }
 
-/// What this thread has had of a CPU, in nanoseconds: on a busy machine, unlike the clock, the same every time. Linux only.
+/// What this thread has had of a CPU, in nanoseconds: on a busy machine, unlike the clock, the same every time. Linux
+/// only.
 fn cpu_time() -> u64 {
     let schedule = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
     schedule.split(' ').next().and_then(|ns| ns.parse().ok()).expect("nanoseconds")

@@ -1,10 +1,10 @@
 //! Subtrees are moved to where they cost less (Meister and Bittner 2018, "Parallel reinsertion for bounding volume
 //! hierarchy optimization").
 //!
-//! In every pass the largest nodes, the largest first, look for their best place in the tree as it is, some dozens of them in
-//! parallel; their moves are then made one after the other, the best first, but for those that touch a node already
-//! touched. So the tree does not depend on the number of threads. Deviations: few at a time, so that most find the tree as it will be;
-//! moves that would make the tree deeper than [`DEEPEST`] are left out.
+//! In every pass the largest nodes, the largest first, look for their best place in the tree as it is, some dozens of
+//! them in parallel; their moves are then made one after the other, the best first, but for those that touch a node
+//! already touched. So the tree does not depend on the number of threads. Deviations: few at a time, so that most find
+//! the tree as it will be; moves that would make the tree deeper than [`DEEPEST`] are left out.
 
 use super::build;
 use super::node::Node;
@@ -162,7 +162,8 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// The place beside `at`, where `left` is what is saved less what those above grow by; and, on the stack, those below.
+    /// The place beside `at`, where `left` is what is saved less what those above grow by; and, on the stack, those
+    /// below.
     #[inline(always)]
     fn consider(&self, left: f32, at: u32, node: &Node, area: f32, best: &mut Move, stack: &mut Vec<(f32, u32)>) {
         let there = self.node(at);
@@ -215,7 +216,8 @@ impl<'a> Tree<'a> {
         self.refit(parent);
     }
 
-    /// Too deep if earlier moves have taken its new place below it: in exact arithmetic no two moves that both gain could.
+    /// Too deep if earlier moves have taken its new place below it: in exact arithmetic no two moves that both gain
+    /// could.
     fn depth_after(&self, m: &Move) -> u32 {
         let (mut depth, mut at) = (1, m.to);
         while at != 0 {

@@ -81,8 +81,8 @@ struct Placed<S: Simd> {
 }
 
 impl LocalRay {
-    /// A ray that is taken as it is, from its origin on, as nearly all are: `t_min` ≥ 0. `None` for others, which are for
-    /// [`uncommon`](Self::uncommon) in a function of its own: what follows is compiled for the constants here.
+    /// A ray that is taken as it is, from its origin on, as nearly all are: `t_min` ≥ 0. `None` for others, which are
+    /// for [`uncommon`](Self::uncommon) in a function of its own: what follows is compiled for the constants here.
     #[inline(always)]
     pub(crate) fn new<S: Simd>(simd: S, frame: &Frame, ray: &Ray, within: Interval) -> Option<Self> {
         let placed = as_it_is(simd, frame, ray)?;
@@ -93,8 +93,9 @@ impl LocalRay {
         Some(Self::placed(&placed, plain_ends(simd, within)))
     }
 
-    /// Any other ray. `None` where it cannot be expressed in the frame (then every leaf is visited): origins 2⁵⁰ times farther
-    /// than the tree is wide, and directions as extreme; also for rays that are not valid and for empty intervals.
+    /// Any other ray. `None` where it cannot be expressed in the frame (then every leaf is visited): origins 2⁵⁰ times
+    /// farther than the tree is wide, and directions as extreme; also for rays that are not valid and for empty
+    /// intervals.
     #[inline(always)]
     pub(crate) fn uncommon<S: Simd>(simd: S, frame: &Frame, ray: &Ray, within: Interval) -> Option<Self> {
         if within.is_empty() {
@@ -113,7 +114,8 @@ impl LocalRay {
         let simd = origin.simd;
         let splat = |x: f32| f32x4::splat(simd, x);
         let inv = splat(1.0) / largest_of(direction.abs(), splat(1.0 / steepest)).copysign(direction);
-        // With the direction's sign: planes met first are met as if the origin lay farther on, the others as if farther back.
+        // With the direction's sign: planes met first are met as if the origin lay farther on, the others as if farther
+        // back.
         let pad = origin.abs().mul_add(splat(SLAB), splat(SLAB + 2.0 * error)).copysign(direction);
         Self {
             away: direction.bitcast::<i32x4<S>>().simd_lt(i32x4::splat(simd, 0)).to_bitmask() as u32,
@@ -135,8 +137,8 @@ impl Limits {
     /// t = λ.
     pub(crate) const PLAIN: Self = Self { stretch: 1.0, advance: 0.0 };
 
-    /// Not below the t of `lambda`: λ·stretch − advance. One addition covers the roundings of both precisions; what matters near
-    /// the tree is far below the limit of 2¹⁰⁰, which keeps infinities out of the sums.
+    /// Not below the t of `lambda`: λ·stretch − advance. One addition covers the roundings of both precisions; what
+    /// matters near the tree is far below the limit of 2¹⁰⁰, which keeps infinities out of the sums.
     #[inline(always)]
     pub(crate) fn upper(&self, lambda: f64) -> f32 {
         let t = lambda * self.stretch;
@@ -228,7 +230,8 @@ fn as_it_is<S: Simd>(simd: S, frame: &Frame, ray: &Ray) -> Option<Placed<S>> {
     Some(Placed { origin, direction, size, length, error: PLAIN_ERROR, steepest: STEEPEST, limits: Limits::PLAIN })
 }
 
-/// The larger of each two that are not below zero, a NaN if there is one: compared as integers, in a quarter of the time.
+/// The larger of each two that are not below zero, a NaN if there is one: compared as integers, in a quarter of the
+/// time.
 #[inline(always)]
 fn largest_of<S: Simd>(a: f32x4<S>, b: f32x4<S>) -> f32x4<S> {
     a.bitcast::<i32x4<S>>().max(b.bitcast::<i32x4<S>>()).bitcast()
@@ -319,7 +322,8 @@ mod tests {
         Rational::try_from(x).unwrap()
     }
 
-    /// A ray meets a plane between the near t of it and the far one: how far from their middle, in halves of what lies between.
+    /// A ray meets a plane between the near t of it and the far one: how far from their middle, in halves of what lies
+    /// between.
     #[test]
     fn no_input_reaches_the_margins() {
         let frame = Frame { center: DVec3::ZERO, exponent: 0, scale: 1.0, unscale: 1.0 };

@@ -7,8 +7,9 @@ use glam::DVec3;
 /// A ray and the stretch of it that counts.
 pub(crate) type Stretch = (Ray, Interval);
 
-/// A bundle at a time by `together`, which is told how many rays count and may refuse, the others one by one. After a refusal bundles are tried ever more
-/// seldom, so that rays without any order cost no more than alone. What is left of the slice is tried if it `may` be a bundle.
+/// A bundle at a time by `together`, which is told how many rays count and may refuse, the others one by one. After a
+/// refusal bundles are tried ever more seldom, so that rays without any order cost no more than alone. What is left of
+/// the slice is tried if it `may` be a bundle.
 pub(crate) fn each<T: Copy + Default>(
     rays: &[Stretch],
     hits: &mut [T],
@@ -52,8 +53,8 @@ pub(crate) fn each<T: Copy + Default>(
 /// Fewer rays than this are no bundle; [`end_together`] looks at six.
 const FEWEST: usize = 8;
 
-/// Rays turned by more than this against each other, and ends farther apart, in lengths of the ray, are not tried as a bundle: of
-/// the way that answers are found, not of the answers.
+/// Rays turned by more than this against each other, and ends farther apart, in lengths of the ray, are not tried as a
+/// bundle: of the way that answers are found, not of the answers.
 const TURNED: f64 = 0.5;
 const APART: f64 = 1e-5;
 
@@ -63,8 +64,8 @@ pub(crate) fn go_together(rays: &[Stretch]) -> bool {
     (1..4).all(|i| is_near(first, rays[i * (rays.len() - 1) / 3].0.direction))
 }
 
-/// Alike, whether the rays may end at one place, and most come there the way their neighbours do: they start at surfaces, here and
-/// there at another than the one before.
+/// Alike, whether the rays may end at one place, and most come there the way their neighbours do: they start at
+/// surfaces, here and there at another than the one before.
 pub(crate) fn end_together(rays: &[Stretch]) -> bool {
     let end = |(ray, within): &Stretch| ray.origin + within.max * ray.direction;
     let (first, last) = (end(&rays[0]), end(&rays[rays.len() - 1]));

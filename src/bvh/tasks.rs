@@ -9,8 +9,8 @@ pub(crate) fn are_parallel() -> bool {
     false
 }
 
-/// Both, at the same time if `parallel`. Where there is one thread the caller's does it: the pool's would find nothing in
-/// its cache.
+/// Both, at the same time if `parallel`. Where there is one thread the caller's does it: the pool's would find nothing
+/// in its cache.
 #[inline]
 pub(crate) fn join<A: Send, B: Send>(
     parallel: bool,

@@ -7,8 +7,8 @@ use super::slab::LocalRay;
 use super::wide::{CHILDREN, LEAF, NONE, Wide, WideNode, near_rows};
 use fearless_simd::{Simd, f32x8, i32x8, prelude::*};
 
-/// What is left to visit. Kept in a fixed array; what does not fit, which no sensible tree needs, goes to the heap. Array and heap are
-/// the caller's, so that the length stays in a register.
+/// What is left to visit. Kept in a fixed array; what does not fit, which no sensible tree needs, goes to the heap.
+/// Array and heap are the caller's, so that the length stays in a register.
 struct Stack<'a, E> {
     entries: &'a mut Entries<E>,
     len: usize,
@@ -96,7 +96,8 @@ fn in_order(a: i64, b: i64) -> (i64, i64) {
     if a < b { (a, b) } else { (b, a) }
 }
 
-/// A vector in memory. Where it straddles two cache lines its lanes reach their loads late; unaligned it does so in every other process.
+/// A vector in memory. Where it straddles two cache lines its lanes reach their loads late; unaligned it does so in
+/// every other process.
 #[repr(align(32))]
 struct Row([f32; 8]);
 
@@ -118,8 +119,8 @@ fn lane_of(hits: u32) -> usize {
     hits.trailing_zeros() as usize & 7
 }
 
-/// A child, and the t where its box begins in the highest bits: as signed integers they sort as t does, but for negative ones among
-/// themselves. Boxes that the ray starts in come first.
+/// A child, and the t where its box begins in the highest bits: as signed integers they sort as t does, but for
+/// negative ones among themselves. Boxes that the ray starts in come first.
 #[inline(always)]
 fn entry(child: u32, t: f32) -> i64 {
     (u64::from(t.to_bits()) << 32 | u64::from(child)) as i64
@@ -147,7 +148,8 @@ pub(crate) struct Lanes<S: Simd, const FORWARD: bool> {
     near_shift: [f32x8<S>; 3],
     far_shift: [f32x8<S>; 3],
     t_min: f32x8<S>,
-    /// Where the rows of the planes met first begin, see [`near_rows`], and of those met last: in floats, so that an address needs no shift.
+    /// Where the rows of the planes met first begin, see [`near_rows`], and of those met last: in floats, so that an
+    /// address needs no shift.
     near: [usize; 3],
     far: [usize; 3],
 }
@@ -181,8 +183,8 @@ impl<S: Simd, const FORWARD: bool> Lanes<S, FORWARD> {
         let exit_z = far_z.mul_sub(inv[2], far[2]);
         let t_max = f32x8::splat(simd, t_max);
         if FORWARD {
-            // As integers, which AVX2 compares in a quarter of the time: of a box that matters every exit is above zero,
-            // and above every entry (§10).
+            // As integers, which AVX2 compares in a quarter of the time: of a box that matters every exit is above
+            // zero, and above every entry (§10).
             let enter = bits(enter_x).max(bits(enter_y)).max(bits(enter_z).max(bits(self.t_min)));
             let exit = bits(exit_x).min(bits(exit_y)).min(bits(exit_z).min(bits(t_max)));
             return (enter.simd_lt(exit).to_bitmask() as u32, enter.bitcast());

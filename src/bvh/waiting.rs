@@ -1,5 +1,5 @@
-//! The boxes that a bundle has yet to visit, nearest first, without a branch that could be mistaken: boxes are sorted by a network, and
-//! all eight of a node are written wherever the next begin.
+//! The boxes that a bundle has yet to visit, nearest first, without a branch that could be mistaken: boxes are sorted
+//! by a network, and all eight of a node are written wherever the next begin.
 
 use fearless_simd::{Simd, f32x8, i32x8, mask32x8, prelude::*, u8x32};
 
@@ -21,8 +21,8 @@ pub(super) fn lane_of(key: i32) -> usize {
     (key & LANE) as usize
 }
 
-/// Keys of those lanes that are hit, the farthest first, and after them what means nothing. As signed integers they sort as t does,
-/// but for negative ones among themselves. By Batcher's network, without a branch.
+/// Keys of those lanes that are hit, the farthest first, and after them what means nothing. As signed integers they
+/// sort as t does, but for negative ones among themselves. By Batcher's network, without a branch.
 #[inline(always)]
 pub(super) fn in_order<S: Simd>(simd: S, hits: mask32x8<S>, enter: f32x8<S>) -> [i32; 8] {
     let t: i32x8<S> = enter.abs().mul_add(f32x8::splat(simd, -ROUNDED), enter).bitcast();

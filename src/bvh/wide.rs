@@ -67,8 +67,8 @@ impl WideNode {
     }
 }
 
-/// Which row of a node holds the plane met first, by axis, by rays for which bit i of `away` says that their direction's coordinate i
-/// is negative; the other of the pair is met last.
+/// Which row of a node holds the plane met first, by axis, by rays for which bit i of `away` says that their
+/// direction's coordinate i is negative; the other of the pair is met last.
 #[inline(always)]
 pub(super) fn near_rows(away: u32) -> [u32; 3] {
     [away & 1, 2 + (away >> 1 & 1), 4 + (away >> 2 & 1)]

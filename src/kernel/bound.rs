@@ -21,43 +21,44 @@ pub const UNDERFLOW: f64 = f64::from_bits((1023 - 1000) << 52); // 2⁻¹⁰⁰�
 /// components; the last one covers the bound's own arithmetic.
 pub const TRIANGLE_SIDES: f64 = 50.0 * U;
 
-/// Triangle, docs/numerics.md §4: the fast path takes a ray if |e₁||e₂||d| and |e₁||e₂||s|, in largest components, are below
-/// this times |D| and |N|.
+/// Triangle, docs/numerics.md §4: the fast path takes a ray if |e₁||e₂||d| and |e₁||e₂||s|, in largest components, are
+/// below this times |D| and |N|.
 pub const TRIANGLE_CONDITION: f64 = (1 << 18) as f64;
 
 /// Triangle, docs/numerics.md §4: then λ, beyond its last rounding, is off by less than this times |λ|.
 pub const TRIANGLE_LAMBDA: f64 = U / 16.0;
 
-/// Triangle, docs/numerics.md §4: in double-double each edge function is off by this times |d|·(|e₁||e₂| + |s|(|e₁|+|e₂|)),
-/// and λ, beyond its last rounding, by this times (|e₁||e₂|/|D|)·(|s| + |λ||d|).
+/// Triangle, docs/numerics.md §4: in double-double each edge function is off by this times |d|·(|e₁||e₂| +
+/// |s|(|e₁|+|e₂|)), and λ, beyond its last rounding, by this times (|e₁||e₂|/|D|)·(|s| + |λ||d|).
 pub const TRIANGLE_CLOSE: f64 = 600.0 * U * U;
 
-/// A triangle's edges, and differences and directions in triple products, stay below this, together: nothing overflows, and underflow takes
-/// less than [`VANISHED`].
+/// A triangle's edges, and differences and directions in triple products, stay below this, together: nothing overflows,
+/// and underflow takes less than [`VANISHED`].
 pub const LARGEST: f64 = f64::from_bits((1023 + 250) << 52);
 
 /// Triple products of numbers below [`LARGEST`] lose less than 2⁻⁸²⁰ by underflow: nothing if they are above this.
 pub const VANISHED: f64 = f64::from_bits((1023 - 640) << 52);
 
-/// Triangle, docs/numerics.md §4: the normal is off by 28u²|e₁||e₂|; if its largest component is above this times |e₁||e₂|, by less
-/// than u of that.
+/// Triangle, docs/numerics.md §4: the normal is off by 28u²|e₁||e₂|; if its largest component is above this times
+/// |e₁||e₂|, by less than u of that.
 pub const TRIANGLE_THICK: f64 = 64.0 * U;
 
-/// Leaving a plane, docs/numerics.md §11: the height n·(o − p) is off by at most this times M·|o − p|, in largest components; M is a
-/// triangle's |e₁||e₂| or the size of a given normal.
+/// Leaving a plane, docs/numerics.md §11: the height n·(o − p) is off by at most this times M·|o − p|, in largest
+/// components; M is a triangle's |e₁||e₂| or the size of a given normal.
 pub const LEAVING_HEIGHT: f64 = 400.0 * U * U;
 
 /// Leaving a plane, docs/numerics.md §11: and n·d by this times M·|d|.
 pub const LEAVING_SLOPE: f64 = 50.0 * U;
 
-/// Plane, docs/numerics.md §3: the fast path takes a ray if the sums of absolute products are below this times |D| and |N|.
+/// Plane, docs/numerics.md §3: the fast path takes a ray if the sums of absolute products are below this times |D| and
+/// |N|.
 pub const PLANE_CONDITION: f64 = (1 << 18) as f64;
 
 /// Plane, docs/numerics.md §3: then λ, beyond its last rounding, is off by less than this times |λ|.
 pub const PLANE_LAMBDA: f64 = U / 256.0;
 
-/// Plane, docs/numerics.md §3: λ beyond its last rounding is off by this times u²κ(P_N/|D| + |λ|κ), where P are the sums of
-/// the products' absolute values and κ = P_D/|D|.
+/// Plane, docs/numerics.md §3: λ beyond its last rounding is off by this times u²κ(P_N/|D| + |λ|κ), where P are the
+/// sums of the products' absolute values and κ = P_D/|D|.
 pub const PLANE_QUOTIENT: f64 = 160.0 * U * U;
 
 /// Polygon, docs/numerics.md §7: a vertex as the ray sees it, sₓd_z − s_zdₓ, is off by at most 6.1u·|s|∞|d|∞.

@@ -178,8 +178,8 @@ impl<L: Lanes> Double<L> {
         Self { hi, lo: (e + f) + ((s + t) + u) }
     }
 
-    /// What is in each lane over what is in the first, off by 40u² of itself and not normalised; and one over the first,
-    /// rounded.
+    /// What is in each lane over what is in the first, off by 40u² of itself and not normalised; and one over the
+    /// first, rounded.
     #[inline(always)]
     pub(super) fn over_first(self) -> (Self, f64) {
         let (hi, lo) = two_sum(self.hi, self.lo);

@@ -12,9 +12,9 @@ use crate::Ray;
 use glam::DVec3;
 use std::cmp::Ordering;
 
-/// Whether a ray that starts strictly on the side of the plane that n points to (`outward`), or on the other, moves away from
-/// it: then it never meets the plane. `None` where that is not certain. The plane goes through `point`; its normal is
-/// a double-double.
+/// Whether a ray that starts strictly on the side of the plane that n points to (`outward`), or on the other, moves
+/// away from it: then it never meets the plane. `None` where that is not certain. The plane goes through `point`; its
+/// normal is a double-double.
 #[inline]
 #[must_use]
 pub(super) fn plane(ray: &Ray, point: &DVec3, normal: &[DVec3; 2], outward: bool) -> Option<bool> {

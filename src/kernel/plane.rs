@@ -1,7 +1,7 @@
 //! A plane: one quotient, N/D = n·(p−o)/n·d, to the last bit.
 //!
-//! Both dot products are compensated (Ogita, Rump, Oishi 2005) with the rounding errors of p−o; one remainder step makes
-//! the quotient of the double-doubles. docs/numerics.md §3.
+//! Both dot products are compensated (Ogita, Rump, Oishi 2005) with the rounding errors of p−o; one remainder step
+//! makes the quotient of the double-doubles. docs/numerics.md §3.
 
 use super::bound::{LARGE, PLANE_CONDITION, PLANE_LAMBDA, PLANE_QUOTIENT, U, UNDERFLOW};
 use super::cpu;
@@ -106,7 +106,8 @@ fn dots<P: Product>(
 }
 
 impl<H: Two> Dots<H> {
-    /// Neither sum has lost more than 18 of its bits, nor anything that counts to underflow. An overflow is not seen here.
+    /// Neither sum has lost more than 18 of its bits, nor anything that counts to underflow. An overflow is not seen
+    /// here.
     #[inline(always)]
     fn are_known(&self) -> bool {
         let &Self { terms: [x, z, _], sums, .. } = self;
@@ -279,8 +280,8 @@ pub fn side(point: DVec3, normal: DVec3, x: DVec3) -> Ordering {
     number::sign_of(|| form(point, normal, x), || form(point, normal, x))
 }
 
-/// Whether `ray` starts strictly on the side of the plane that `normal` points to, or for `outward` = false on the other, and
-/// does not meet the plane on its way: both exactly. `point` and `normal` finite.
+/// Whether `ray` starts strictly on the side of the plane that `normal` points to, or for `outward` = false on the
+/// other, and does not meet the plane on its way: both exactly. `point` and `normal` finite.
 #[must_use]
 pub fn departs(ray: &Ray, point: DVec3, normal: DVec3, outward: bool) -> bool {
     leaving::plane(ray, &point, &[normal, DVec3::ZERO], outward).unwrap_or_else(|| {

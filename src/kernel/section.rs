@@ -166,8 +166,8 @@ impl<N: Number> Quadratic<N> {
     }
 }
 
-/// The nearest of the two ends that lies inside `within`, each with the part it is on. An error of a quarter of an ulp of
-/// `fine` will do.
+/// The nearest of the two ends that lies inside `within`, each with the part it is on. An error of a quarter of an ulp
+/// of `fine` will do.
 #[inline(always)]
 pub(super) fn nearest<N: Number>(
     [(enter, enter_part), (exit, exit_part)]: [(End<N>, u32); 2],

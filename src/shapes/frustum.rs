@@ -81,8 +81,8 @@ impl Frustum {
         frustum::precise_lambda(ray, self.base, self.top, self.base_radius, self.top_radius, hit.lambda)
     }
 
-    /// From base to top, as a vector and its factor: two where the difference overflows, else one. Subtracted before anything is scaled,
-    /// or a short axis far out would vanish.
+    /// From base to top, as a vector and its factor: two where the difference overflows, else one. Subtracted before
+    /// anything is scaled, or a short axis far out would vanish.
     fn axis(&self) -> (DVec3, f64) {
         let v = self.top - self.base;
         if v.is_finite() { (v, 1.0) } else { (0.5 * self.top - 0.5 * self.base, 2.0) }
@@ -228,8 +228,8 @@ impl Frustum {
         frustum::departs(ray, self.base, self.top, self.base_radius, self.top_radius, outward)
     }
 
-    /// A cone's wall curves at most as its circle does (by the cosine less). The radial part of its normal is off by 8u of
-    /// the distance from the nearer end; docs/numerics.md §6.
+    /// A cone's wall curves at most as its circle does (by the cosine less). The radial part of its normal is off by 8u
+    /// of the distance from the nearer end; docs/numerics.md §6.
     fn tangent_at(&self, f: &Foot, ray: &Ray, hit: &Hit) -> Tangent {
         let normal = self.normal_at(f, ray, hit);
         if hit.part == BASE || hit.part == TOP {

@@ -6,8 +6,8 @@ use glam::{DVec2, DVec3};
 
 /// The plane n·(p − `point`) = 0, unbounded.
 ///
-/// n is `normal` exactly as given, of any non-zero length; only [`Shape::normal`] returns a unit vector. A ray along the
-/// plane, inside it or beside it, misses.
+/// n is `normal` exactly as given, of any non-zero length; only [`Shape::normal`] returns a unit vector. A ray along
+/// the plane, inside it or beside it, misses.
 ///
 /// Texture coordinates are lengths along two unit tangents: the first is a coordinate axis (the one the normal leans
 /// to least) made perpendicular to the normal, the second is the normal × the first; both count from `point`.

@@ -201,8 +201,8 @@ fn turns(w: DVec3, n: DVec3, v: DVec3, r: [f64; 2], growth: f64, rate: f64, dl: 
 
 /// (from a cap's centre)·v: this·v·(that one's distance + size).
 const HEIGHT: f64 = 8.0 * U;
-/// λ need not be better known than to 4u·2⁻⁴⁰ of the largest coordinate over the direction's length; that is `size`/14 or
-/// more over d. Rays that begin on the solid are behind such a λ.
+/// λ need not be better known than to 4u·2⁻⁴⁰ of the largest coordinate over the direction's length; that is `size`/14
+/// or more over d. Rays that begin on the solid are behind such a λ.
 const FLOOR: f64 = 4.0 * U / (14.0 * (1u64 << 40) as f64);
 /// Lengths stay below this, so that forms of degree eight do not overflow.
 const TOO_LARGE: f64 = (1u128 << 100) as f64;

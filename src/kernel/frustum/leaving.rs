@@ -1,9 +1,9 @@
 //! Whether a ray leaves the solid that it starts next to, in plain arithmetic.
 //!
-//! The solid is where three functions of a point are not above zero: the heights beyond both caps' planes, and |q| − R, with
-//! q the point's way from the axis and R the wall's radius at its height. The first two are linear along a ray, the third is
-//! convex: one that is above zero and grows stays so. Where a sign is not certain the exact test has to say:
-//! docs/numerics.md §11.
+//! The solid is where three functions of a point are not above zero: the heights beyond both caps' planes, and |q| − R,
+//! with q the point's way from the axis and R the wall's radius at its height. The first two are linear along a ray,
+//! the third is convex: one that is above zero and grows stays so. Where a sign is not certain the exact test has to
+//! say: docs/numerics.md §11.
 
 use super::Solid;
 use crate::kernel::bound::{U, UNDERFLOW};
@@ -39,8 +39,8 @@ impl Known {
     }
 }
 
-/// Whether it is certain that the ray starts outside and never meets the solid, or, if not `outward`, that it starts inside. All
-/// three surfaces are looked at: nothing foretells which one was left, and which way.
+/// Whether it is certain that the ray starts outside and never meets the solid, or, if not `outward`, that it starts
+/// inside. All three surfaces are looked at: nothing foretells which one was left, and which way.
 pub(super) fn is_certain(ray: &Ray, solid: &Solid, outward: bool) -> bool {
     let (o, d, v) = (ray.origin, ray.direction, solid.top - solid.base);
     let ordinary = in_range(taxicab(d), 100) & in_range(taxicab(v), 100);

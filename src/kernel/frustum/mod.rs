@@ -32,8 +32,8 @@ pub const TOP: u32 = 2;
 /// points, or one where they coincide (tangent, rim, apex). This also settles lines in a cap's plane, along the wall
 /// and through the apex. All of it is decided as exact arithmetic on these numbers would. λ is within 4 ulp of the
 /// exact λ (an ulp of 2⁻⁴⁰ of the largest coordinate over |direction| if that is larger), and `error` bounds what it is
-/// off. `part` is [`WALL`], [`BASE`] or [`TOP`]: a rim belongs to its cap (but to the wall for a ray in the cap's plane),
-/// an apex to the wall.
+/// off. `part` is [`WALL`], [`BASE`] or [`TOP`]: a rim belongs to its cap (but to the wall for a ray in the cap's
+/// plane), an apex to the wall.
 ///
 /// A ray that is not [valid](Ray::is_valid) misses, and so does everything if the solid is none: a number that is not
 /// finite, equal points, a negative radius or both zero.
@@ -75,8 +75,8 @@ pub fn side(point: DVec3, base: DVec3, top: DVec3, base_radius: f64, top_radius:
     refined!(locate(point, &solid)).unwrap_or(Ordering::Greater)
 }
 
-/// Whether `ray` starts strictly outside the solid and does not meet it, or for `outward` = false starts strictly inside: both
-/// exactly. A solid that [`intersect`] accepts.
+/// Whether `ray` starts strictly outside the solid and does not meet it, or for `outward` = false starts strictly
+/// inside: both exactly. A solid that [`intersect`] accepts.
 #[must_use]
 pub fn departs(ray: &Ray, base: DVec3, top: DVec3, base_radius: f64, top_radius: f64, outward: bool) -> bool {
     let solid = Solid { base, top, base_radius, top_radius };

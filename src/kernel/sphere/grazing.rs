@@ -1,5 +1,5 @@
-//! Rays that graze a sphere: discriminant and both roots in double-double, with bounds known beforehand; exact tangents of
-//! short numbers by integers. docs/numerics.md §5, "Grazing".
+//! Rays that graze a sphere: discriminant and both roots in double-double, with bounds known beforehand; exact tangents
+//! of short numbers by integers. docs/numerics.md §5, "Grazing".
 
 use super::super::bound::U;
 use super::super::eft::{Product, two_diff, two_sum};

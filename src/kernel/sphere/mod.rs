@@ -2,8 +2,8 @@
 //!
 //! With f = origin − center: A = |d|², b = f·d, D = r²A − |f × d|² (Lagrange's form of b² − AC, whose error grows with
 //! |f|, not with |f|²), λ = (−b ∓ √D)/A, then one Newton step with the residual |f + λd|² − r² in double-double, whose
-//! slope at the root is ∓2√D. Rays that start next to the sphere have a way of their own, `near.rs`, and so have those that
-//! graze it, `grazing.rs`. docs/numerics.md §5 proves every constant.
+//! slope at the root is ∓2√D. Rays that start next to the sphere have a way of their own, `near.rs`, and so have those
+//! that graze it, `grazing.rs`. docs/numerics.md §5 proves every constant.
 //!
 //! Close to Haines, Günther, Akenine-Möller 2019 (Ray Tracing Gems ch. 7) in the discriminant; the step, the bounds and
 //! the exact refinement are this crate's.
@@ -87,7 +87,8 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
         if (first + FIRST * z <= within.min) | is_behind {
             continue;
         }
-        // `rest` is far above `FIRST`·u·z: then λ is `first` to within a part of it, and known. Not where the ray grazes.
+        // `rest` is far above `FIRST`·u·z: then λ is `first` to within a part of it, and known. Not where the ray
+        // grazes.
         let known = rest <= 0.4 * U * first.abs();
         if !known {
             return cold();
@@ -111,7 +112,8 @@ fn fast<P: Product>(ray: &Ray, center: DVec3, r: f64, within: Interval) -> Optio
 /// Whether nothing over- or underflows that counts; a NaN does.
 #[inline(always)]
 fn is_ordinary(f: DVec3, d: DVec3, r: f64) -> bool {
-    // 2⁻²⁵⁶ ≤ x < 2²⁵⁶ for both at once: what is out of range, negative or not a number has one of the upper three bits.
+    // 2⁻²⁵⁶ ≤ x < 2²⁵⁶ for both at once: what is out of range, negative or not a number has one of the upper three
+    // bits.
     let above = |x: f64| x.to_bits().wrapping_sub((1023 - 256) << 52);
     ((above(r) | above(plain_dot(d, d) * r * r)) < 512 << 52) & (r + taxicab(f) < FARTHEST * r)
 }
@@ -176,8 +178,8 @@ pub fn side(point: DVec3, center: DVec3, radius: f64) -> Ordering {
     refined!(locate(point, center, radius)).unwrap_or(Ordering::Greater)
 }
 
-/// Whether `ray` starts strictly outside the sphere and does not meet it, or for `outward` = false starts strictly inside: both
-/// exactly. A sphere that [`intersect`] accepts.
+/// Whether `ray` starts strictly outside the sphere and does not meet it, or for `outward` = false starts strictly
+/// inside: both exactly. A sphere that [`intersect`] accepts.
 #[must_use]
 pub fn departs(ray: &Ray, center: DVec3, radius: f64, outward: bool) -> bool {
     ray.is_valid()

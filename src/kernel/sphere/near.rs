@@ -40,8 +40,8 @@ pub(super) fn is_behind(f: DVec3, d: DVec3, b: f64, r: f64) -> bool {
     (c * b > 0.0) & (c.abs() > PLAIN_C * (r * r)) & (b.abs() > PLAIN_B * (r * taxicab(d)))
 }
 
-/// Whether plain arithmetic is certain that a ray starts outside, next to the sphere, and moves away from it, or, if not
-/// `outward`, that it starts inside.
+/// Whether plain arithmetic is certain that a ray starts outside, next to the sphere, and moves away from it, or, if
+/// not `outward`, that it starts inside.
 #[inline(always)]
 pub(super) fn is_leaving(ray: &Ray, center: DVec3, r: f64, outward: bool) -> bool {
     let (f, d) = (ray.origin - center, ray.direction);
@@ -51,12 +51,12 @@ pub(super) fn is_leaving(ray: &Ray, center: DVec3, r: f64, outward: bool) -> boo
     next & if outward { away } else { c < -PLAIN_C * r2 }
 }
 
-/// The nearest hit inside `within`. The ray is ordinary, D is certainly positive, |A·C| ≤ [`NEXT`]·A·r². Scalars, so that
-/// the caller's vectors stay in registers.
+/// The nearest hit inside `within`. The ray is ordinary, D is certainly positive, |A·C| ≤ [`NEXT`]·A·r². Scalars, so
+/// that the caller's vectors stay in registers.
 #[inline(never)]
 pub(super) fn intersect(ray: &Ray, x: f64, y: f64, z: f64, r: f64, min: f64, max: f64) -> Option<Hit> {
-    // Captured in this order: coordinates side by side would be loaded as a vector just after they were stored one by one,
-    // and wait for that.
+    // Captured in this order: coordinates side by side would be loaded as a vector just after they were stored one by
+    // one, and wait for that.
     cpu::dispatch(
         #[inline(always)]
         move || ahead::<Fused>(ray, x, r, y, min, z, max),
@@ -72,7 +72,8 @@ fn ahead<P: Product>(ray: &Ray, x: f64, r: f64, y: f64, min: f64, z: f64, max: f
     let c = Excess::or_zero::<P>(&f, r);
     let roots = Roots::new::<P>(&f, d, &c);
     if (within.min >= 0.0) & roots.known {
-        // The near root lies behind the origin if C has the sign of b, on it if C is zero; the far one if b is above zero.
+        // The near root lies behind the origin if C has the sign of b, on it if C is zero; the far one if b is above
+        // zero.
         let root = if c.hi * roots.b >= 0.0 {
             if roots.b > 0.0 {
                 return None;

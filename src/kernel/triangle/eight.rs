@@ -35,8 +35,8 @@ pub struct Passed<S: Simd> {
     pub known: u32,
 }
 
-/// [`super::passed`] for eight rays. `plain`: the edges of all triangles are vectors of floats. `least`, times |e₁||e₂| in
-/// largest components: what |D| and |N| have to be above.
+/// [`super::passed`] for eight rays. `plain`: the edges of all triangles are vectors of floats. `least`, times |e₁||e₂|
+/// in largest components: what |D| and |N| have to be above.
 ///
 /// For code that was dispatched to the instructions of `simd`.
 #[inline(always)]

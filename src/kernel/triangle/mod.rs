@@ -1,8 +1,8 @@
 //! A triangle, decided exactly.
 //!
-//! The three edge functions of Möller and Trumbore 1997 in the arrangement that shares d×(o−a), their signs certified by
-//! one filter; λ is the plane's quotient with a normal in double-double, its bound proved beforehand. Where the filter is
-//! silent the signs are found in double-double, in integers or by [`Dyadic`]s. docs/numerics.md §4.
+//! The three edge functions of Möller and Trumbore 1997 in the arrangement that shares d×(o−a), their signs certified
+//! by one filter; λ is the plane's quotient with a normal in double-double, its bound proved beforehand. Where the
+//! filter is silent the signs are found in double-double, in integers or by [`Dyadic`]s. docs/numerics.md §4.
 
 use crate::kernel::bound::{
     LARGEST, TRIANGLE_CLOSE, TRIANGLE_CONDITION, TRIANGLE_LAMBDA, TRIANGLE_SIDES, U, UNDERFLOW, VANISHED,
@@ -91,10 +91,11 @@ fn agreement(u: f64, v: f64, w: f64) -> f64 {
     if least > -most { least } else { -most }
 }
 
-/// The hit of a ray that a mesh's filter has proved to meet the triangle at a λ that counts, to the bit as [`intersect_with`] has it; `None` where
-/// that would leave its fast path. That the edge functions would satisfy it follows from the margins of the filter and of this file:
-/// docs/numerics.md §4. `plain`: b − a and c − a are vectors of floats. `least`: that |D| and |N| are large enough if they are above
-/// these, where the filter knows it; else their sizes are found here. For code that was dispatched to the instructions of `simd`.
+/// The hit of a ray that a mesh's filter has proved to meet the triangle at a λ that counts, to the bit as
+/// [`intersect_with`] has it; `None` where that would leave its fast path. That the edge functions would satisfy it
+/// follows from the margins of the filter and of this file: docs/numerics.md §4. `plain`: b − a and c − a are vectors
+/// of floats. `least`: that |D| and |N| are large enough if they are above these, where the filter knows it; else their
+/// sizes are found here. For code that was dispatched to the instructions of `simd`.
 #[inline(always)]
 #[must_use]
 pub fn passed<S: Simd>(
@@ -153,8 +154,8 @@ struct Products<P: Product> {
 }
 
 impl<P: Product> Products<P> {
-    /// `DECIDE`: there will be a branch on them. What n is made of would be kept in memory till after it, and takes longer
-    /// there than n's low part does now.
+    /// `DECIDE`: there will be a branch on them. What n is made of would be kept in memory till after it, and takes
+    /// longer there than n's low part does now.
     #[inline(always)]
     fn new<const DECIDE: bool>(
         cpu: <P::Lanes as Lanes>::Cpu,
@@ -461,7 +462,8 @@ pub fn compare(ray: &Ray, first: &[DVec3; 3], second: &[DVec3; 3]) -> Ordering {
     plane::<Dyadic>(ray, first).compare_exactly(&plane(ray, second))
 }
 
-/// Whether the ray, which meets both planes in one point each, meets both in one point of a vertex or an edge that they share.
+/// Whether the ray, which meets both planes in one point each, meets both in one point of a vertex or an edge that they
+/// share.
 fn meet_in_common(ray: &Ray, first: &[DVec3; 3], second: &[DVec3; 3]) -> bool {
     let on = |a: usize, b: usize| edge_sign(ray, first[a], first[b]) == Ordering::Equal;
     match first.map(|v| second.contains(&v)) {

@@ -111,8 +111,8 @@ impl Corners<'_> {
             self.edges(&mut leaf, numbers);
             square(load(simd, &leaf.vertices[1])).sqrt() + square(load(simd, &leaf.vertices[2])).sqrt()
         };
-        // Differences, squares, sums, roots, the last sum and these two: less than 8 roundings; and squares that underflow, here
-        // and in the filter, which relies on it (docs/numerics.md §10).
+        // Differences, squares, sums, roots, the last sum and these two: less than 8 roundings; and squares that
+        // underflow, here and in the filter, which relies on it (docs/numerics.md §10).
         let size = lengths * f32x8::splat(simd, 1.0 + 16.0 * E) + f32x8::splat(simd, 2e-22);
         let most: f32x8<S> = most.simd_into(simd);
         leaf.size = size.min(most).into();
@@ -139,8 +139,8 @@ impl Corners<'_> {
     }
 }
 
-/// Whether all coordinates are multiples of 2⁻⁵², as those of f32 are that do not lie between 0 and 2⁻²⁹. They are at most 1, so
-/// that no difference needs more than the 53 bits of f64: it is exact, here and out of the frame.
+/// Whether all coordinates are multiples of 2⁻⁵², as those of f32 are that do not lie between 0 and 2⁻²⁹. They are at
+/// most 1, so that no difference needs more than the 53 bits of f64: it is exact, here and out of the frame.
 #[inline(always)]
 fn is_short<S: Simd>(simd: S, vertices: [[f32x8<S>; 3]; 3]) -> mask32x8<S> {
     let (zero, least) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, power(-29) as f32));

@@ -1,5 +1,5 @@
-//! Closest and any hits of many rays. Where as many in a row as a bundle has go the same way they are walked together; the answers
-//! are those of each ray alone.
+//! Closest and any hits of many rays. Where as many in a row as a bundle has go the same way they are walked together;
+//! the answers are those of each ray alone.
 
 use super::Mesh;
 use super::leaf::{Margins, Spot, Verdict, filter};
@@ -49,8 +49,8 @@ trait Answers<S: Simd>: Sized {
     /// Considers a triangle for sixteen rays, and answers which of them need no more.
     fn of_sixteen(walk: &mut Walk<Self>, simd: S, spot: Spot, sixteen: usize, verdict: &OfSixteen<S>) -> u32;
 
-    /// Considers a triangle for one ray, which may pass it between the t of `depth`; `through`: certainly passes through its
-    /// inside. `true` if the ray needs no more.
+    /// Considers a triangle for one ray, which may pass it between the t of `depth`; `through`: certainly passes
+    /// through its inside. `true` if the ray needs no more.
     fn of_one(walk: &mut Walk<Self>, simd: S, spot: Spot, ray: usize, through: bool, depth: [f32; 2]) -> bool;
 
     /// Keeps the bundle's t_max, after a leaf.
@@ -207,8 +207,8 @@ fn closest_with<S: Simd>(
     true
 }
 
-/// The search for the nearest hits. Of the triangles that are certainly hit the nearest so far is remembered, and whatever may
-/// not be told from it is settled in f64 at once; λ of what remains when the walk has ended.
+/// The search for the nearest hits. Of the triangles that are certainly hit the nearest so far is remembered, and
+/// whatever may not be told from it is settled in f64 at once; λ of what remains when the walk has ended.
 struct Nearests<'a> {
     /// Not above t of the triangle that is remembered, at `spot`; t_max is not below.
     low: [[f32; 16]; SIXTEENS],

@@ -134,7 +134,8 @@ fn steps(size: f32, origin_error: f32) -> f32 {
     (1.0 + size) * (1.0 + 128.0 * E) + origin_error * (1.0 / E)
 }
 
-/// Whether leaves are tested as others test them, to find out what certainty costs: CONTRIBUTING.md. The answers are wrong then.
+/// Whether leaves are tested as others test them, to find out what certainty costs: CONTRIBUTING.md. The answers are
+/// wrong then.
 pub(super) const UNCERTIFIED: bool = cfg!(truehit_uncertified);
 
 /// What underflow may add to an edge function.
@@ -169,8 +170,8 @@ impl Probe {
         if t_min > -self.reach { t_min } else { -self.reach }
     }
 
-    /// Which triangles of `leaf` may be met between `t_min`, as of [`first`](Self::first), and `t_max`, and what is known of them;
-    /// `None` if none.
+    /// Which triangles of `leaf` may be met between `t_min`, as of [`first`](Self::first), and `t_max`, and what is
+    /// known of them; `None` if none.
     #[inline(always)]
     pub(super) fn test<S: Simd>(&self, simd: S, leaf: &Leaf, [t_min, t_max]: [f32; 2]) -> Option<OfEight<S>> {
         let triangles = leaf.triangles(simd, self.exact);
@@ -265,8 +266,8 @@ impl<M> Sides<M> {
         V: SimdFloat<S, Element = f32, Mask = M>,
         M: SimdMask<S>,
     {
-        // The sign of det goes to t's numerator. Where it is uncertain the far margin is wide enough for both, and nothing is
-        // said to lie before t_min.
+        // The sign of det goes to t's numerator. Where it is uncertain the far margin is wide enough for both, and
+        // nothing is said to lie before t_min.
         let size_of_det = det.abs();
         let signed = V::from_bits(t.to_bits() ^ (det.to_bits() & V::splat(simd, -0.0).to_bits()));
         let depth = of_det.mul_add(t_min.abs().max(last.abs()), of_t);
@@ -389,7 +390,8 @@ pub(super) struct Outcome {
     pub(super) depths: Depths,
 }
 
-/// t of a leaf's triangles, by lane: between these where the line certainly passes through, and nothing where it may not.
+/// t of a leaf's triangles, by lane: between these where the line certainly passes through, and nothing where it may
+/// not.
 pub(super) struct Depths {
     low: [f32; 8],
     high: [f32; 8],

@@ -7,13 +7,16 @@ use crate::bvh::{self, Ends, Lanes, Limits, LocalRay};
 use crate::kernel::eft::{Fused, Split};
 use crate::kernel::{cpu, tally, textbook, triangle};
 use crate::{Hit, Interval, Ray};
-use fearless_simd::{Level, Simd, dispatch};
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+use fearless_simd::Level;
+use fearless_simd::{Simd, dispatch};
 use glam::DVec3;
 use std::cmp::Ordering;
 
 /// The nearest hit; the lowest triangle of those met at exactly the same λ.
 ///
-/// By value down to where it is found: in memory of this function's it would be copied by loads that wait for all of its stores.
+/// By value down to where it is found: in memory of this function's it would be copied by loads that wait for all of
+/// its stores.
 #[inline(always)]
 pub(super) fn closest(mesh: &Mesh, ray: &Ray, within: Interval) -> Option<Hit> {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -51,14 +54,17 @@ pub(super) fn find_closest(mesh: &Mesh, ray: &Ray, within: Interval, hit: &mut O
     });
 }
 
-/// Whether these instructions need no function of their own. Then the query would be inlined into the one that dispatches,
-/// and all others would pay for its frame.
+/// Whether these instructions need no function of their own. Then the query would be inlined into the one that
+/// dispatches, and all others would pay for its frame.
 #[inline(always)]
 fn is_baseline<S: Simd>(simd: S) -> bool {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     return !matches!(simd.level(), Level::Sse4_2(_) | Level::Avx2(_) | Level::Avx512(_));
     #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-    true
+    {
+        let _ = simd;
+        true
+    }
 }
 
 #[inline(never)]
@@ -66,8 +72,8 @@ fn closest_apart<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, within: Interval) -> 
     closest_with(simd, mesh, ray, within)
 }
 
-/// A query on its way into a closure, which takes it through memory. The limits do not stand side by side: they would be stored
-/// one by one and loaded as a pair, which has to wait until both have reached the cache.
+/// A query on its way into a closure, which takes it through memory. The limits do not stand side by side: they would
+/// be stored one by one and loaded as a pair, which has to wait until both have reached the cache.
 #[repr(C)]
 struct Asked<'a> {
     min: f64,
@@ -292,8 +298,8 @@ impl<'a> Nearest<'a> {
         }
     }
 
-    /// Considers a triangle that may be met between the t of `depth`; `through`: whose inside the line certainly passes. Elsewhere the
-    /// sign of the denominator is not known, and the depths mean nothing.
+    /// Considers a triangle that may be met between the t of `depth`; `through`: whose inside the line certainly
+    /// passes. Elsewhere the sign of the denominator is not known, and the depths mean nothing.
     #[inline(always)]
     fn consider<S: Simd>(&mut self, simd: S, spot: Spot, through: bool, depth: [f32; 2]) {
         if self.count == MOST_PASSED {
@@ -304,7 +310,8 @@ impl<'a> Nearest<'a> {
         }
     }
 
-    /// Whether no more is to be done at once with a triangle that the line certainly passes through: it is too far, or certainly a hit.
+    /// Whether no more is to be done at once with a triangle that the line certainly passes through: it is too far, or
+    /// certainly a hit.
     #[inline(always)]
     fn remember(&mut self, spot: Spot, [low, high]: [f32; 2]) -> bool {
         if low > self.ends.t_max {

@@ -1,7 +1,8 @@
 //! Eight triangles seen from one place: what rays from there have in common.
 //!
-//! Edge functions, denominator and numerator of t are linear in the direction, with coefficients that are the same for all rays:
-//! U = (e₂ × C)·d, V = (C × e₁)·d, det = (e₁ × e₂)·d. The bounds on their errors are those of the filter: docs/numerics.md §10.
+//! Edge functions, denominator and numerator of t are linear in the direction, with coefficients that are the same for
+//! all rays: U = (e₂ × C)·d, V = (C × e₁)·d, det = (e₁ × e₂)·d. The bounds on their errors are those of the filter:
+//! docs/numerics.md §10.
 
 use super::leaf::{Margins, Sides, Sighting, Triangles, Vec8, Verdict, cross, dot, minus, splat, three};
 use crate::bvh::{Bundle, E, SIXTEENS, Sixteen};
@@ -36,10 +37,12 @@ impl View {
 #[repr(align(64))]
 pub(super) struct Seen([[f32; 8]; ROWS]);
 
-/// Coefficients of the direction in U, V and det, t's numerator, the margin of the edge functions and the two of the depth.
+/// Coefficients of the direction in U, V and det, t's numerator, the margin of the edge functions and the two of the
+/// depth.
 const ROWS: usize = 13;
 
-/// The margin of a test of all directions at once, against that of one: it loses 14 roundings of |e||r||d| where that loses 12.
+/// The margin of a test of all directions at once, against that of one: it loses 14 roundings of |e||r||d| where that
+/// loses 12.
 const OF_ALL: f32 = 1.25;
 
 /// [`Seen`], in lanes that are compared with rays.
@@ -104,8 +107,8 @@ impl Seen {
         let [v_low, v_high] = ends(v, middle, half);
         let [w_low, w_high] = ends(minus(minus(det, u), v), middle, half);
         let [det_low, det_high] = ends(det, middle, half);
-        // Certainly missed by all: the denominator, or one edge function, is above zero for all and another below. The four are
-        // of one sign where a triangle is hit.
+        // Certainly missed by all: the denominator, or one edge function, is above zero for all and another below. The
+        // four are of one sign where a triangle is hit.
         let (most, least) = (u_low.max(v_low).max(w_low), u_high.min(v_high).min(w_high));
         let margin = edges * splat(simd, OF_ALL);
         let (below, above) = (least.simd_lt(-margin), most.simd_gt(margin));

@@ -14,21 +14,23 @@ use crate::{Hit, Ray};
 use fearless_simd::{Simd, f32x8, f64x4, f64x8, prelude::*};
 use glam::{DVec2, DVec3};
 
-/// The frame's unit over ε·[`TRIANGLE_CONDITION`]; infinite where products might leave the range of f64, so that no D or N is
-/// as large as is asked of it.
+/// The frame's unit over ε·[`TRIANGLE_CONDITION`]; infinite where products might leave the range of f64, so that no D
+/// or N is as large as is asked of it.
 pub(super) fn unit(frame: &Frame) -> f64 {
     let ordinary = (power(-60) < frame.unscale) & (frame.unscale < power(60));
     if ordinary { frame.unscale / (f64::from(E) * TRIANGLE_CONDITION) } else { f64::INFINITY }
 }
 
-/// How large |D| and |N| have to be, where |e₁||e₂| in largest components is not above `edges`, that λ is known well enough.
+/// How large |D| and |N| have to be, where |e₁||e₂| in largest components is not above `edges`, that λ is known well
+/// enough.
 #[inline(always)]
 fn least(mesh: &Mesh, margins: &Margins, edges: f64) -> [f64; 2] {
     let ([d, s], by) = (margins.sizes(), edges * mesh.unit);
     [f64::from(d) * by, f64::from(s) * by]
 }
 
-/// The hit of a ray, to the bit as [`exactly`] has it; `None` where that has to be asked. `probe`: of a ray that is taken as it is.
+/// The hit of a ray, to the bit as [`exactly`] has it; `None` where that has to be asked. `probe`: of a ray that is
+/// taken as it is.
 #[inline(always)]
 pub(super) fn settle_one<S: Simd>(simd: S, mesh: &Mesh, ray: &Ray, spot: Spot, probe: Option<&Probe>) -> Option<Hit> {
     if UNCERTIFIED {
